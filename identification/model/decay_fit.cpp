@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -24,6 +25,9 @@ constexpr double kPenalty = 4;
 /// have them, and a model that lacks one shifts those near it. With inputs it only finds fewer.
 constexpr double kExpected = 2;
 
+/// Radians, or powers of e, from sample to sample: what is faster is over before the second one.
+constexpr double kFastest = 10;
+
 std::vector<DecayFactor> moved(const std::vector<DecayFactor>& factors, const VectorXd& step) {
   std::vector<DecayFactor> result = factors;
   Index at = 0;
@@ -40,23 +44,26 @@ std::vector<DecayFactor> moved(const std::vector<DecayFactor>& factors, const Ve
 }
 
 /// Whether a step stays among motions that a record can show.
-bool makes_sense(const std::vector<DecayFactor>& factors, double longest) {
-  return std::all_of(factors.begin(), factors.end(), [longest](const DecayFactor& factor) {
+bool makes_sense(const std::vector<DecayFactor>& factors, double longest, double fastest) {
+  return std::all_of(factors.begin(), factors.end(), [&](const DecayFactor& factor) {
     const auto lambda = factor.eigenvalues();
-    return std::isfinite(modulus(lambda[0])) && std::isfinite(modulus(lambda[1])) &&
+    return std::max(modulus(lambda[0]), modulus(lambda[1])) < fastest &&
            std::max(lambda[0].real(), lambda[1].real()) * longest < 30 &&
            modulus(lambda[0]) * longest > 0.1;  // else it is a constant
   });
 }
 
-double longest_record(const DecayData& data) {
-  double longest = 0;
+/// s: the longest record, and the mean of its steps.
+std::array<double, 2> length_and_step(const DecayData& data) {
+  std::array<double, 2> result{};
   for (const DecayPart& part : data.parts) {
     for (const VectorXd& time : part.time) {
-      if (time.size() > 0) longest = std::max(longest, time[time.size() - 1]);
+      if (time.size() < 2 || time[time.size() - 1] <= result[0]) continue;
+      result[0] = time[time.size() - 1];
+      result[1] = result[0] / static_cast<double>(time.size() - 1);
     }
   }
-  return longest;
+  return result;
 }
 
 /// Fits `factors` and the noise of channels and records together, from what `fit` has of them: each
@@ -67,7 +74,8 @@ class Descent {
   Descent(const DecayData& data, DecayFit& fit) : data_(data), fit_(fit) {}
 
   bool run(int max_iterations, double hopeless) {
-    const double longest = longest_record(data_);
+    const auto [longest, step_of_time] = length_and_step(data_);
+    const double fastest = kFastest / step_of_time;
     const double enough = max_iterations > kFew ? kSmallGain : kSearchGain;
     VariableProjection now(data_, fit_.factors, fit_.noise, fit_.record_noise);
     double lambda = 1e-3;
@@ -88,7 +96,7 @@ class Descent {
         if (!step.allFinite()) return false;
         if (step.dot(now.gradient) < enough && settled) return true;  // no step promises more
         const std::vector<DecayFactor> next = moved(fit_.factors, step);
-        if (makes_sense(next, longest)) {
+        if (makes_sense(next, longest, fastest)) {
           VariableProjection there(data_, next, fit_.noise, fit_.record_noise);
           const double gain = misfit(now) - misfit(there);
           if (gain >= 0) {

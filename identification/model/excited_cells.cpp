@@ -2,8 +2,6 @@
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
 
-#include <unsupported/Eigen/FFT>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,7 +13,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -23,33 +20,14 @@ constexpr Index kMostCells = 8000;  // of all records
 constexpr double kBin = 0.04;       // of the band of the inputs: bins that count together
 constexpr double kBridge = 3.5;     // steps, over which samples are interpolated
 
-/// As many numbers, or a few more, of which a Fourier transform is fast.
-Index transformed(Index samples) {
-  while (smooth_count(samples) != samples) ++samples;
-  return samples;
-}
-
-/// Squares of the spectrum of a sequence's differences, from line 1: what begins and ends at
-/// different values leaks less.
-VectorXd power_of(const VectorXd& samples) {
-  const Index N = transformed(samples.size() - 1);
-  Eigen::FFT<double> fft;
-  VectorXcd lines;
-  VectorXd differences = VectorXd::Zero(N);
-  differences.head(samples.size() - 1) =
-      samples.tail(samples.size() - 1) - samples.head(samples.size() - 1);
-  fft.fwd(lines, differences);
-  return lines.segment(1, std::max<Index>(1, N / 2 - 1)).cwiseAbs2();
-}
-
 /// rad/s below which 99 % of what the inputs do is.
 double input_band(const std::vector<DrivenGrid>& grids) {
   double band = 0;
   for (const DrivenGrid& grid : grids) {
     for (const auto& row : grid.input.rowwise()) {
-      VectorXd power = power_of(row.transpose());
-      const double width = 2 * std::numbers::pi /
-                           (static_cast<double>(transformed(grid.input.cols() - 1)) * grid.step);
+      VectorXd power = difference_power(row.transpose());
+      const double width =
+          2 * std::numbers::pi / (static_cast<double>(2 * power.size() + 2) * grid.step);
       for (Index k = 0; k < power.size(); ++k) {
         power[k] /= std::pow(2 * std::sin(width * static_cast<double>(k + 1) * grid.step / 2), 2);
       }
@@ -58,26 +36,6 @@ double input_band(const std::vector<DrivenGrid>& grids) {
       Index k = 0;
       while (k < power.size() && sum < 0.99 * all) sum += power[k++];
       if (all > 0) band = std::max(band, width * static_cast<double>(k));
-    }
-  }
-  return band;
-}
-
-/// rad/s up to which some channel's motion stands out from its noise.
-double output_band(const MatrixXd& grid, double step, const VectorXd& noise, double input) {
-  double band = 0;
-  const double width =
-      2 * std::numbers::pi / (static_cast<double>(transformed(grid.cols() - 1)) * step);
-  for (Index c = 0; c < grid.rows(); ++c) {
-    const VectorXd power = power_of(grid.row(c).transpose());
-    const Index bin = std::max<Index>(8, static_cast<Index>(kBin * input / width));
-    for (Index from = 0; from + bin <= power.size(); from += bin) {
-      const double w = width * (static_cast<double>(from) + 0.5 * static_cast<double>(bin));
-      const double floor =
-          static_cast<double>(grid.cols()) * std::pow(2 * std::sin(w * step / 2) * noise[c], 2);
-      if (power.segment(from, bin).mean() > 10 * floor) {
-        band = std::max(band, width * static_cast<double>(from + bin));
-      }
     }
   }
   return band;
@@ -165,7 +123,10 @@ ExcitedCells::ExcitedCells(const std::vector<MotionRecord>& all) {
   if (!(band > 0)) throw std::invalid_argument("identify: no input moves");
   for (MatrixXd whole : grids) {
     bridge(whole);
-    highest = std::max(highest, output_band(whole, fine, sample_noise, band));
+    const double width = 2 * std::numbers::pi / (static_cast<double>(whole.cols()) * fine);
+    highest = std::max(highest,
+                       band_of_motion(whole, fine, sample_noise,
+                                      std::max<Index>(8, static_cast<Index>(kBin * band / width))));
   }
   if (!(highest > 0)) throw std::invalid_argument("identify: nothing follows the inputs");
   highest = std::clamp(highest, band / 3, 3 * band);

@@ -13,6 +13,9 @@ namespace dashpot::identification {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+/// What has fallen to this share by the next sample is over, and no sum of decays shows it.
+constexpr double kOver = 1e-4;
+
 Realization::Realization(const std::vector<MatrixXd>& sequences, double step, Index channels,
                          Index max_rows)
     : step_(step), channels_(channels), block_(sequences.front().rows()) {
@@ -87,7 +90,7 @@ std::vector<RealizedPole> Realization::poles(int order) const {
   if (solver.info() != Eigen::Success) return result;
   for (Index i = 0; i < order; ++i) {
     const Complex z = solver.eigenvalues()[i];
-    if (z.imag() < 0 || (z.imag() == 0 && z.real() <= 0)) continue;
+    if (z.imag() < 0 || std::abs(z) < kOver || (z.imag() == 0 && z.real() <= 0)) continue;
     const Eigen::VectorXcd shape = observability.topRows(channels_) * solver.eigenvectors().col(i);
     result.push_back({std::log(z) / step_, shape.normalized()});
   }

@@ -1,10 +1,12 @@
 #include <dashpot/identification/records/decay_cells.hpp>
+#include <dashpot/identification/records/motion_kind.hpp>
 
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace dashpot::identification {
 namespace {
@@ -13,10 +15,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Returns the most cells of a record; each of many records has fewer.
-Index most_cells(std::size_t records) {
+/// Cells of a record; each of many records has fewer.
+Index usual_cells(std::size_t records) {
   return std::clamp<Index>(600 / static_cast<Index>(records), 100, 300);
 }
+
+constexpr double kOversampled = 1.5;  // cells in half a period, at least
+constexpr double kBand = 0.02;        // of all frequencies: lines of a spectrum that count together
 
 /// The value below which this share of them lies.
 double quantile(std::vector<double> values, double share) {
@@ -139,7 +144,7 @@ VectorXd first_noise(const std::vector<MotionRecord>& records) {
 }
 
 DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd& sample_noise,
-                       const VectorXd& lost) {
+                       const VectorXd& lost, Index most) {
   const double fine = typical_step(motions);
   std::vector<MatrixXd> grids, gaps;
   std::vector<Index> lengths;
@@ -152,7 +157,21 @@ DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd&
     lengths.push_back(std::max<Index>(2, length));
     longest = std::max(longest, lengths.back());
   }
-  const Index per_cell = std::max<Index>(1, longest / most_cells(motions.size()));
+  Index per_cell = std::max<Index>(1, longest / usual_cells(motions.size()));
+  // Cells that are longer than half a period of the fastest motion would show it as a slower one.
+  double highest = 0;
+  for (std::size_t r = 0; most > 0 && r < grids.size(); ++r) {
+    const double samples = kBand / 2 * static_cast<double>(grids[r].cols());
+    const auto lines = std::max<Index>(8, static_cast<Index>(samples));
+    highest = std::max(highest, band_of_motion(grids[r], fine, sample_noise, lines));
+  }
+  if (kOversampled * highest * fine * static_cast<double>(per_cell) > std::numbers::pi) {
+    const double half_period = std::numbers::pi / (kOversampled * highest * fine);
+    per_cell = std::max<Index>(1, static_cast<Index>(half_period));
+    const Index each = most / static_cast<Index>(motions.size());
+    longest = std::min(longest, per_cell * std::max(usual_cells(motions.size()), each));
+  }
+  for (Index& length : lengths) length = std::min(length, longest);
   step = fine * static_cast<double>(per_cell);
   duration = fine * static_cast<double>(longest);
   factor_ = 1 / std::sqrt(static_cast<double>(per_cell));

@@ -19,9 +19,11 @@ Eigen::MatrixXd on_grid(const MotionRecord& record, double step, Eigen::MatrixXd
 /// decays stays one, with the same eigenvalues, and the noise falls.
 class DecayCells {
  public:
-  /// Up to where the motion of all channels is `lost`, at least their noise.
+  /// Up to where the motion of all channels is `lost`, at least their noise. Cells are short enough
+  /// for the fastest motion; where this takes more than about `most` cells of all records, they are
+  /// those of the beginnings. 0: cells are as long as it comes, for a first estimate.
   DecayCells(const std::vector<MotionRecord>& motions, const Eigen::VectorXd& sample_noise,
-             const Eigen::VectorXd& lost);
+             const Eigen::VectorXd& lost, Eigen::Index most);
 
   std::vector<MotionRecord> records;  ///< in the channels' units; NaN in long gaps
   Eigen::VectorXd noise;              ///< of a cell

@@ -1,6 +1,7 @@
 #include <dashpot/identification/motion_verdict.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
+#include <dashpot/identification/records/steady_lines.hpp>
 
 #include <Eigen/QR>
 #include <unsupported/Eigen/FFT>
@@ -14,6 +15,7 @@
 namespace dashpot::identification {
 namespace {
 
+using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
@@ -41,21 +43,12 @@ constexpr double kPeriodic =
     0.95;  // share of the motion at the cycle's frequency and its multiples
 constexpr double kMainThing = 0.2;  // least share of the record's largest deflection: else a hum
 
-/// Squares of the spectrum of a channel's differences, from line 1.
-VectorXd difference_power(const VectorXd& samples, Index count) {
-  Eigen::FFT<double> fft;
-  VectorXcd lines;
-  const VectorXd differences = samples.segment(1, count) - samples.head(count);
-  fft.fwd(lines, differences);
-  return lines.segment(1, std::max<Index>(1, count / 2 - 1)).cwiseAbs2();
-}
-
 double pace_of_stretch(const MatrixXd& grid, double step, const VectorXd& noise) {
   const Index N = smooth_count(grid.cols() - 1);
   VectorXd sum = VectorXd::Zero(std::max<Index>(1, N / 2 - 1));
   const double width = 2 * std::numbers::pi / (static_cast<double>(N) * step);
   for (Index c = 0; c < grid.rows(); ++c) {
-    VectorXd power = difference_power(grid.row(c).transpose(), N);
+    VectorXd power = difference_power(grid.row(c).head(N + 1).transpose());
     double all = 0;
     for (Index from = 0; from < power.size(); from += kSmooth) {
       const Index count = std::min(kSmooth, power.size() - from);
@@ -198,6 +191,39 @@ Index smooth_count(Index samples) {
   }
 }
 
+VectorXd difference_power(const VectorXd& samples) {
+  Index N = samples.size() - 1;
+  while (smooth_count(N) != N) ++N;  // of which a fast Fourier transform is fast
+  Eigen::FFT<double> fft;
+  VectorXcd lines;
+  VectorXd differences = VectorXd::Zero(N);
+  differences.head(samples.size() - 1) =
+      samples.tail(samples.size() - 1) - samples.head(samples.size() - 1);
+  fft.fwd(lines, differences);
+  return lines.segment(1, std::max<Index>(1, N / 2 - 1)).cwiseAbs2();
+}
+
+double band_of_motion(const MatrixXd& grid, double step, const VectorXd& noise, Index lines) {
+  const Index begin = std::max<Index>(1, grid.cols() / 20);
+  const ArrayXd onset = ArrayXd::LinSpaced(begin, 0, std::numbers::pi / 2).sin().square();
+  double band = 0;
+  for (Index c = 0; c < grid.rows(); ++c) {
+    VectorXd rising = grid.row(c).transpose().array() - grid(c, grid.cols() - 1);
+    rising.head(onset.size()).array() *= onset;  // what begins at once has all frequencies
+    const VectorXd power = difference_power(rising);
+    const double width = std::numbers::pi / (static_cast<double>(power.size() + 1) * step);
+    for (Index from = 0; from + lines <= power.size(); from += lines) {
+      const double w = width * (static_cast<double>(from) + 0.5 * static_cast<double>(lines));
+      const double floor =
+          static_cast<double>(grid.cols()) * std::pow(2 * std::sin(w * step / 2) * noise[c], 2);
+      if (power.segment(from, lines).mean() > 10 * floor) {
+        band = std::max(band, width * static_cast<double>(from + lines));
+      }
+    }
+  }
+  return band;
+}
+
 double pace_of(const MatrixXd& grid, double step, const VectorXd& noise) {
   // The median of stretches: a jump has no pace, and spoils one or two of them.
   std::vector<double> paces;
@@ -219,6 +245,7 @@ MotionVerdict judge_motion(const MotionRecord& record) {
   const double step = typical_step({record});
   const VectorXd noise = first_noise({record});
   MatrixXd grid = on_grid(record, step);
+  take_steady_lines(grid, step, true);
   const VectorXd mean = grid.rowwise().mean();
   const VectorXd size =
       (grid.colwise() - mean).rowwise().norm() / std::sqrt(static_cast<double>(grid.cols()));

@@ -1,3 +1,4 @@
+#include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
 #include <dashpot/identification/records/steady_lines.hpp>
 
@@ -22,7 +23,8 @@ using Eigen::VectorXd;
 constexpr Index kNear = 30;          // bins of the spectrum to each side
 constexpr double kOutstanding = 20;  // times their median
 constexpr Index kSteadyParts = 8;
-constexpr double kSteady = 0.7;  // of irregular motion, two in ten thousand reach it
+constexpr double kSteady = 0.7;      // of irregular motion, two in ten thousand reach it
+constexpr double kSteadyHum = 0.95;  // in the second half of a decay
 constexpr int kMostLines = 20;
 
 ArrayXd taper_of(Index samples) {
@@ -95,8 +97,8 @@ double refined(const MatrixXd& scaled, double w, double bin, double step) {
   return (a + b) / 2;
 }
 
-/// Share of the motion at frequency `w` in parts of the record that has one phase, 0 to 1.
-double steadiness(const MatrixXd& scaled, double w, double step) {
+/// The motion at frequency `w` in parts of the record, channels x parts.
+MatrixXcd amplitudes_of(const MatrixXd& scaled, double w, double step) {
   const Index length = scaled.cols() / kSteadyParts;
   const VectorXcd turns = turning(w, step, scaled.cols());
   const ArrayXd taper = taper_of(length);
@@ -105,13 +107,34 @@ double steadiness(const MatrixXd& scaled, double w, double step) {
     amplitudes.col(p) = scaled.middleCols(p * length, length) *
                         (turns.segment(p * length, length).array() * taper).matrix();
   }
+  return amplitudes * (4 / static_cast<double>(length));  // the taper's mean is a half
+}
+
+/// Share of amplitudes in parts of a record that has one phase, 0 to 1.
+double steadiness(const MatrixXcd& amplitudes) {
   const double all = amplitudes.squaredNorm();
-  return all > 0 ? amplitudes.rowwise().sum().squaredNorm() / (kSteadyParts * all) : 0;
+  return all > 0 ? amplitudes.rowwise().sum().squaredNorm() /
+                       (static_cast<double>(amplitudes.cols()) * all)
+                 : 0;
+}
+
+/// Whether a line has one amplitude in the second half of the record, where a decay fades, and is
+/// small beside the motion.
+bool is_hum(const MatrixXd& scaled, const MatrixXcd& amplitudes) {
+  constexpr double kLevel = 0.15, kSmall = 0.1;
+  const auto size = [&](Index from) {
+    return amplitudes.middleCols(from, kSteadyParts / 4).rowwise().sum().norm() / 2;
+  };
+  const double early = size(kSteadyParts / 2), late = size(3 * kSteadyParts / 4);
+  const Index last = scaled.cols() / kSteadyParts;
+  const VectorXd rest = scaled.rightCols(last).rowwise().mean();
+  return std::abs(early - late) < kLevel * late &&
+         late < kSmall * (scaled.colwise() - rest).colwise().norm().maxCoeff();
 }
 
 }  // namespace
 
-std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step) {
+std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step, bool of_decays) {
   std::vector<SteadyLine> lines;
   if (grid.cols() < 16 * kNear) return lines;
   const VectorXd mean = grid.rowwise().mean();
@@ -126,12 +149,18 @@ std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step) {
     if (k < 0) break;
     tried[static_cast<std::size_t>(k)] = true;
     const double w = refined(scaled, bin * static_cast<double>(k), bin, step);
-    if (steadiness(scaled, w, step) < kSteady) continue;
+    const MatrixXcd parts = amplitudes_of(scaled, w, step);
+    const bool steady = of_decays ? is_hum(scaled, parts) &&
+                                        steadiness(parts.rightCols(kSteadyParts / 2)) > kSteadyHum
+                                  : steadiness(parts) >= kSteady;
+    if (!steady) continue;
     const VectorXcd turns = turning(w, step, grid.cols());
     MatrixXd waves(grid.cols(), 2);
     waves << turns.real(), turns.imag();
+    // Tapered: where a record begins and ends, other motion looks like the line.
+    const MatrixXd weighted = taper_of(grid.cols()).matrix().asDiagonal() * waves;
     const MatrixXd shares =
-        (waves.transpose() * waves).ldlt().solve(waves.transpose() * scaled.transpose());
+        (weighted.transpose() * waves).ldlt().solve(weighted.transpose() * scaled.transpose());
     scaled -= (waves * shares).transpose();
     lines.push_back({w, VectorXcd(grid.rows())});
     lines.back().size.real() = sizes.cwiseProduct(shares.row(0).transpose());
@@ -140,6 +169,19 @@ std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step) {
   }
   if (!lines.empty()) grid = (sizes.asDiagonal() * scaled).colwise() + mean;
   return lines;
+}
+
+std::vector<SteadyLine> take_hums(MotionRecord& record) {
+  const double step = typical_step({record});
+  MatrixXd grid = on_grid(record, step);
+  std::vector<SteadyLine> hums = take_steady_lines(grid, step, true);
+  for (const SteadyLine& hum : hums) {
+    for (Index i = 0; i < record.time.size(); ++i) {
+      const Complex turn = std::polar(1.0, hum.frequency * (record.time[i] - record.time[0]));
+      record.output.col(i) -= (hum.size * turn).real();
+    }
+  }
+  return hums;
 }
 
 }  // namespace dashpot::identification

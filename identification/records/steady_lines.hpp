@@ -14,7 +14,12 @@ struct SteadyLine {
 /// Takes the steady lines away from the samples in `grid`, channels x samples `step` s apart.
 ///
 /// A line stands out from the spectrum near it, and its phase in eight parts of the record is that
-/// of one sinusoid; that of a mode under irregular forces wanders.
-std::vector<SteadyLine> take_steady_lines(Eigen::MatrixXd& grid, double step);
+/// of one sinusoid; that of a mode under irregular forces wanders. Of decays it has to be small and
+/// of one amplitude in the second half, where modes fade.
+std::vector<SteadyLine> take_steady_lines(Eigen::MatrixXd& grid, double step,
+                                          bool of_decays = false);
+
+/// Takes hums away from a record of decays, at the times of its samples.
+std::vector<SteadyLine> take_hums(MotionRecord& record);
 
 }  // namespace dashpot::identification

@@ -191,12 +191,7 @@ Identification identify_ambient(const std::vector<MotionRecord>& records,
     for (MeasuredMode& mode : *list) mode.shape = turned(data.sizes.asDiagonal() * mode.shape);
   }
   for (const SteadyLine& hum : data.hums) {
-    MeasuredMode mode;
-    mode.eigenvalues = {Complex(0, hum.frequency), Complex(0, -hum.frequency)};
-    mode.natural_frequency = hum.frequency;
-    mode.shape = turned(hum.size);
-    mode.reason = "a steady hum, taken away";
-    result.rejected.push_back(std::move(mode));
+    result.rejected.push_back(to_mode(hum));
   }
   return moving.of_all(std::move(result));
 }

@@ -1,6 +1,7 @@
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/model/decay_columns.hpp>
 #include <dashpot/identification/records/check_that.hpp>
+#include <dashpot/identification/records/steady_lines.hpp>
 #include <dashpot/identification/search/measured_modes.hpp>
 #include <dashpot/identification/search/model_search.hpp>
 #include <dashpot/identification/search/moving_channels.hpp>
@@ -149,21 +150,29 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   if (search.larger) doubt_order(search.fit, *search.larger, modes);
   result.order = static_cast<int>(at);
   // Friction makes of one mode others near it, heavily damped ones, and weak ones.
-  constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2, kMuch = 0.1;
+  constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2, kMuch = 0.1, kOfRest = 0.3,
+                   kPoor = 0.01;
   double most = 0;
   for (const MeasuredMode& mode : modes) {
     if (mode.damping_ratio < kLightly) most = std::max(most, mode.energy);
   }
-  const bool doubted =
-      (search.differs || 1 - result.explained > kMuch) && search.fit.whiteness > kFarFromWhite;
+  // Of driven motion the noise of inputs is left over, too.
+  const bool coloured = search.fit.whiteness > kFarFromWhite;
+  const bool doubted = coloured && (search.data.inputs == 0 || 1 - result.explained > kMuch);
   for (MeasuredMode& mode : modes) {
-    if (mode.stability == 0 && mode.energy < 1 - result.explained) {
+    const double rest = 1 - result.explained;
+    if (mode.stability > 0 && mode.energy < kOfRest * rest) {
+      mode.reason = "much weaker than what is left over";
+    } else if (mode.stability == 0 && mode.energy < rest) {
       mode.reason = "weaker than what is left over, and in no model of another order";
+    } else if (mode.stability == 0 && rest > kPoor) {
+      mode.reason = "in no model of another order, and much is left over";
     }
     if (doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
-      mode.reason =
-          std::string(search.differs ? "parts of the records differ" : "much is left over") +
-          ": it may be friction, or what else is not linear";
+      mode.reason = std::string(search.differs                 ? "parts of the records differ"
+                                : 1 - result.explained > kMuch ? "much is left over"
+                                                               : "what is left over is no noise") +
+                    ": it may be friction, or what else is not linear";
     }
   }
   for (const DecayFactor& factor : search.not_repeated) {
@@ -184,8 +193,14 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
                                const IdentifyOptions& options) {
   check_records(records);
   check_order(options);
-  const MovingChannels moving(records);
-  return moving.of_all(describe(ModelSearch(moving.records, options), moving.records));
+  MovingChannels moving(records);
+  std::vector<SteadyLine> hums;
+  for (MotionRecord& record : moving.records) {
+    for (SteadyLine& hum : take_hums(record)) hums.push_back(std::move(hum));
+  }
+  Identification result = describe(ModelSearch(moving.records, options), moving.records);
+  for (const SteadyLine& hum : hums) result.rejected.push_back(to_mode(hum));
+  return moving.of_all(std::move(result));
 }
 
 Identification identify_excited(const std::vector<MotionRecord>& records,

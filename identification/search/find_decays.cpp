@@ -1,6 +1,7 @@
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
+#include <dashpot/identification/records/steady_lines.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -208,7 +209,8 @@ std::vector<FreeDecay> find_decays(const MotionRecord& record, const std::vector
   check_records({record});
   const VectorXd noise = first_noise({record});
   const double step = typical_step({record});
-  const MatrixXd grid = on_grid(record, step);
+  MatrixXd grid = on_grid(record, step);
+  take_steady_lines(grid, step, true);
   const double pace = pace_of(grid, step, noise);
   if (!(pace > 0)) return {};
   const double period = 2 * std::numbers::pi / (pace * step);

@@ -64,6 +64,8 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
 }
 
 constexpr double kHarmonic = 3;  // of friction and other forces that are odd; sums tell even ones
+constexpr double kMostEnergy = 100;     // energy of what cancels against others
+constexpr double kCoincides = 0.002;    // relative: what is not linear moves the larger modes, too
 constexpr double kLightlyDamped = 0.3;  // what lasts long enough to have harmonics
 
 /// Why a mode is not to be believed; empty if it is.
@@ -73,7 +75,7 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
   if (lambda[0] == lambda[1] && lambda[0].imag() == 0) {
     return "a decay without oscillation, whose partner the records do not show";
   }
-  if (mode.energy > 100) return "it cancels against others like it: neither is determined";
+  if (mode.energy > kMostEnergy) return "it cancels against others like it: neither is determined";
   if (!(mode.natural_frequency_std < 0.05 * mode.natural_frequency)) {
     return "its frequency is not determined";
   }
@@ -106,26 +108,24 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
   }
   if (mode.damping_ratio + 2 * mode.damping_ratio_std < 0) return "it grows";
   if (mode.damping_ratio <= 0) return "it does not decay within its deviation";
-  for (const MeasuredMode& other : all) {
-    const double w = other.eigenvalues[0].imag(), multiple = kHarmonic * w;
-    const double within = std::max(
-        0.005 * multiple,
-        2 * std::hypot(mode.natural_frequency_std, kHarmonic * other.natural_frequency_std));
-    if (w > 0 && mode.damping_ratio < kLightlyDamped && other.energy > 10 * mode.energy &&
-        std::abs(lambda[0].imag() - multiple) < within) {
+  // Of modes that are known themselves.
+  const auto explains = [&mode](const MeasuredMode& other) {
+    return &other != &mode && other.energy > 10 * mode.energy && other.energy < kMostEnergy;
+  };
+  const auto coincides = [&mode](double distance, double size) {
+    return distance < std::max(kCoincides * size, 2 * mode.natural_frequency_std);
+  };
+  for (const MeasuredMode& a : all) {
+    if (!explains(a)) continue;
+    const double multiple = kHarmonic * a.eigenvalues[0].imag();
+    if (multiple > 0 && mode.damping_ratio < kLightlyDamped &&
+        coincides(std::abs(lambda[0].imag() - multiple), multiple)) {
       return "three times the frequency of a larger mode: not a mode, but what is not linear";
     }
-  }
-  for (const MeasuredMode& a : all) {
     for (const MeasuredMode& b : all) {
-      if (&a == &mode || &b == &mode || a.energy < 10 * mode.energy ||
-          b.energy < 10 * mode.energy) {
-        continue;
-      }
+      if (!explains(b)) continue;
       for (const Complex& other : {b.eigenvalues[0], b.eigenvalues[1]}) {
-        const Complex sum = a.eigenvalues[0] + other;
-        if (std::abs(sum - lambda[0]) <
-            std::max(0.005 * std::abs(lambda[0]), 2 * mode.natural_frequency_std)) {
+        if (coincides(std::abs(a.eigenvalues[0] + other - lambda[0]), std::abs(lambda[0]))) {
           return "the sum of two eigenvalues of larger modes: not a mode, but what is not linear";
         }
       }
@@ -135,6 +135,15 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
 }
 
 }  // namespace
+
+MeasuredMode to_mode(const SteadyLine& hum) {
+  MeasuredMode mode;
+  mode.eigenvalues = {Complex(0, hum.frequency), Complex(0, -hum.frequency)};
+  mode.natural_frequency = hum.frequency;
+  mode.shape = turned(hum.size);
+  mode.reason = "a steady hum, taken away";
+  return mode;
+}
 
 std::vector<ModelPole> model_poles(const std::vector<std::vector<RealizedPole>>& by_order) {
   std::vector<ModelPole> result;
@@ -176,6 +185,16 @@ void judge(std::vector<MeasuredMode> modes, double duration, double step, Identi
     MeasuredMode judged = mode;
     if (judged.reason.empty()) judged.reason = doubt(mode, modes, duration, step);
     (judged.reason.empty() ? result.modes : result.rejected).push_back(std::move(judged));
+  }
+  // A model most of which is none makes up the rest of it, too, as for what friction leaves.
+  if (result.rejected.size() > result.modes.size()) {
+    const auto alone = std::stable_partition(result.modes.begin(), result.modes.end(),
+                                             [](const auto& mode) { return mode.stability > 0; });
+    for (auto mode = alone; mode != result.modes.end(); ++mode) {
+      mode->reason = "in no model of another order, and most of this one is not believed";
+      result.rejected.push_back(std::move(*mode));
+    }
+    result.modes.erase(alone, result.modes.end());
   }
   const auto slower = [](const MeasuredMode& a, const MeasuredMode& b) {
     return a.natural_frequency < b.natural_frequency;

@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/model/realization.hpp>
+#include <dashpot/identification/records/steady_lines.hpp>
 
 #include <vector>
 
@@ -11,6 +12,9 @@ double likeness(const Eigen::VectorXcd& u, const Eigen::VectorXcd& v);
 
 /// Returns the shape with unit length, its largest entry real and positive.
 Eigen::VectorXcd turned(const Eigen::VectorXcd& shape);
+
+/// A hum that was taken away, as a mode that is not believed.
+MeasuredMode to_mode(const SteadyLine& hum);
 
 /// The eigenvalues of models of rising order, from order 1, and whether each is stable.
 std::vector<ModelPole> model_poles(const std::vector<std::vector<RealizedPole>>& by_order);

@@ -108,7 +108,10 @@ void ModelSearch::keep_repeated() {
   // Motion that no model explains is not noise, and looks like a mode near another one.
   const bool copied =
       std::max(colour_, fit.whiteness) > kColoured && copy_in(fit) < fit.factors.size();
-  if (contradicted(fit, scatter) == fit.factors.size() && !copied) return;
+  if (contradicted(fit, scatter) == fit.factors.size() && !copied) {
+    if (fit.whiteness > kColoured) add_spread_of_orders();
+    return;
+  }
   differs = true;
   const DecayFit before = fit;
   larger.reset();
@@ -176,7 +179,8 @@ std::size_t ModelSearch::copy_in(const DecayFit& whole) const {
   return whole.factors.size();
 }
 
-/// Where parts differ, so do models of other orders: how they do is part of the deviations.
+/// Where parts differ, or what is left over is no noise, models of other orders differ, too: how
+/// they do is part of the deviations.
 void ModelSearch::add_spread_of_orders() {
   for (std::size_t k = 0; k < fit.factors.size(); ++k) {
     if (!fit.factors[k].pair) continue;

@@ -20,6 +20,7 @@ using Eigen::VectorXd;
 
 constexpr int kRoughIterations = 4;  ///< of models of rising order: a first estimate
 constexpr int kProductIterations = 12;
+constexpr Index kSearchCells = 3000;
 /// A change of the model is given up where -2 log likelihood will stay larger by this. With 60,
 /// searches among heavily damped modes give up models that become the best ones.
 constexpr double kDifference = 300;
@@ -99,7 +100,8 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOpt
   const bool refine = options.refine;
   const VectorXd noise = first_noise(all);
   const std::vector<MotionRecord> records = strongest(all, noise);
-  const DecayCells cells(records, noise, noise.cwiseMax(DecayData::kLinear * data.motion));
+  const DecayCells cells(records, noise, noise.cwiseMax(DecayData::kLinear * data.motion),
+                         refine ? kSearchCells : 0);
   const Index channels = data.channels;
   const Realization realization(cells.weighted(), cells.step, channels, refine ? 300 : 120);
   const int wanted =

@@ -179,9 +179,22 @@ TEST(MeasuredModes, AtTheSumOfTwoMuchLargerOnesAreNone) {
   EXPECT_THAT(at(a + b, 0.4), HasSubstr(text));
   EXPECT_THAT(at(std::conj(a) + b, 0.4), HasSubstr(text));
   EXPECT_THAT(at(a + a, 0.4), HasSubstr(text));
-  EXPECT_THAT(at((a + b) * (1.0 + 0.0049 * up), 0.4), HasSubstr(text));
-  EXPECT_EQ(at((a + b) * (1.0 + 0.0052 * up), 0.4), "");
+  EXPECT_THAT(at((a + b) * (1.0 + 0.0019 * up), 0.4), HasSubstr(text));
+  EXPECT_EQ(at((a + b) * (1.0 + 0.0022 * up), 0.4), "");
   EXPECT_EQ(at(a + b, 0.09), "");
+  EXPECT_EQ(at(a + b, 101), "");  // which cancels, and is not known itself
+}
+
+/// What a model needs beside its modes says that the record is not a sum of decays.
+TEST(MeasuredModes, OfOneOrderAloneAreBelievedAmongFewThatAreNot) {
+  MeasuredMode alone = good_mode(10), first = good_mode(23), second = good_mode(40);
+  alone.stability = 0;
+  first.shape = shape_of(0, 1);
+  first.energy = second.energy = 200;  // none
+  EXPECT_EQ(reason({alone, first}), "");
+  EXPECT_THAT(reason({alone, first, second}), StartsWith("in no model of another order"));
+  alone.stability = 0.1;
+  EXPECT_EQ(reason({alone, first, second}), "");
 }
 
 TEST(MeasuredModes, OfASingleDecayArePairedByTheirShapes) {

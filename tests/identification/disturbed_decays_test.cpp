@@ -1,0 +1,143 @@
+// Decays that last long, and decays with what a hum or friction adds to them.
+#include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/motion_verdict.hpp>
+#include <dashpot/tests/support/dice.hpp>
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <numbers>
+#include <vector>
+
+namespace dashpot::identification {
+namespace {
+
+using Eigen::Index;
+using testing::Dice;
+
+struct Oscillator {
+  double w, z;
+  double damped() const { return w * std::sqrt(1 - z * z); }
+  /// From 1 at rest.
+  double released(double t) const {
+    return std::exp(-z * w * t) *
+           (std::cos(damped() * t) + z * w / damped() * std::sin(damped() * t));
+  }
+};
+
+constexpr std::array<Oscillator, 2> kTwo = {{{9, 0.12}, {31, 0.3}}};
+
+/// Two channels, `step` (s) apart, of two oscillators.
+template <typename Motion>
+MotionRecord record_of(double duration, double step, double noise, Dice& draw,
+                       const Motion& motion) {
+  const auto samples = static_cast<Index>(duration / step);
+  MotionRecord record{Eigen::VectorXd(samples), Eigen::MatrixXd(2, samples), {}};
+  for (Index i = 0; i < samples; ++i) {
+    const double t = record.time[i] = step * static_cast<double>(i);
+    const double x = motion(kTwo[0], t), y = motion(kTwo[1], t);
+    record.output.col(i) << 0.02 * x + 0.01 * y + noise * draw.normal(),
+        0.01 * x - 0.02 * y + noise * draw.normal();
+  }
+  return record;
+}
+
+void expect_two(const Identification& found, double within) {
+  ASSERT_EQ(found.modes.size(), 2U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(found.modes[k].natural_frequency, kTwo[k].w, within * kTwo[k].w);
+    EXPECT_NEAR(found.modes[k].damping_ratio, kTwo[k].z, within);
+    EXPECT_LT(std::abs(found.modes[k].natural_frequency - kTwo[k].w),
+              4 * found.modes[k].natural_frequency_std);
+  }
+}
+
+/// A chain of masses that is struck rings at high frequencies for long.
+TEST(DisturbedDecays, FastModesAreThereHoweverLongTheRecord) {
+  constexpr std::array<Oscillator, 4> kChain = {
+      {{59.4, 0.01}, {162.6, 0.01}, {245.2, 0.0128}, {302.5, 0.0151}}};
+  for (const double duration : {2.0, 6.0, 20.0}) {
+    Dice draw(51);
+    const auto samples = static_cast<Index>(duration / 0.005);
+    MotionRecord record{Eigen::VectorXd(samples), Eigen::MatrixXd::Zero(4, samples), {}};
+    for (Index i = 0; i < samples; ++i) {
+      const double t = record.time[i] = 0.005 * static_cast<double>(i);
+      for (std::size_t k = 0; k < 4; ++k) {
+        for (Index c = 0; c < 4; ++c) {
+          const double shape =
+              std::sin(static_cast<double>((2 * k + 1) * static_cast<std::size_t>(c + 1)) *
+                       std::numbers::pi / 9);
+          record.output(c, i) +=
+              shape * std::exp(-kChain[k].z * kChain[k].w * t) * std::sin(kChain[k].damped() * t);
+        }
+      }
+      for (double& y : record.output.col(i)) y += 1e-3 * draw.normal();
+    }
+    const Identification found = identify_decays({record});
+    ASSERT_EQ(found.modes.size(), 4U) << duration;
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(found.modes[k].natural_frequency, kChain[k].w,
+                  4 * found.modes[k].natural_frequency_std);
+      EXPECT_LT(found.modes[k].natural_frequency_std, 1e-3 * kChain[k].w);
+    }
+    EXPECT_LT(found.whiteness, 2) << duration;
+  }
+}
+
+TEST(DisturbedDecays, AHumIsTakenAwayAndMakesNoAmbientMotion) {
+  for (const double size : {1e-3, 1e-2}) {
+    Dice draw(52);
+    MotionRecord record = record_of(
+        2.3, 0.001, 1e-5, draw, [](const Oscillator& one, double t) { return one.released(t); });
+    for (Index i = 0; i < record.time.size(); ++i) {
+      record.output.col(i).array() +=
+          0.02 * size * std::sin(100 * std::numbers::pi * record.time[i] + 1);
+    }
+    EXPECT_EQ(judge_motion(record).kind, MotionKind::kDecays) << size;
+    const Identification found = identify_decays({record});
+    expect_two(found, 2e-3);
+    ASSERT_FALSE(found.rejected.empty());
+    EXPECT_NEAR(found.rejected.back().natural_frequency, 100 * std::numbers::pi, 0.1);
+    EXPECT_EQ(found.rejected.back().reason, "a steady hum, taken away");
+  }
+}
+
+/// Whatever friction makes of a decay, none of it is a mode of ratio above 0.1 that is not there.
+TEST(DisturbedDecays, FrictionMakesNoModes) {
+  int false_modes = 0, modes = 0;
+  for (const double friction : {0.02, 0.05, 0.1}) {
+    for (const std::uint64_t seed : {55U, 56U}) {
+      Dice draw(seed);
+      const auto rubbing = [friction, x = std::array<double, 2>{1, 1}, v = std::array<double, 2>{}](
+                               const Oscillator& one, double) mutable {
+        const std::size_t k = one.w < 20 ? 0 : 1;
+        const double now = x[k];
+        for (int part = 0; part < 20; ++part) {
+          const double stick = std::tanh(v[k] / 0.02) * friction;
+          v[k] -= 5e-5 * (one.w * one.w * (x[k] + stick) + 2 * one.z * one.w * v[k]);
+          x[k] += 5e-5 * v[k];
+        }
+        return now;
+      };
+      auto motion = rubbing;
+      const Identification found = identify_decays(
+          {record_of(2, 0.001, 1e-5, draw,
+                     [&motion](const Oscillator& one, double t) { return motion(one, t); })});
+      for (const MeasuredMode& mode : found.modes) {
+        ++modes;
+        const bool right =
+            std::abs(mode.natural_frequency - 9) < 0.9 + 2 * mode.natural_frequency_std ||
+            std::abs(mode.natural_frequency - 31) < 3.1 + 2 * mode.natural_frequency_std;
+        false_modes += !right;
+      }
+    }
+  }
+  std::printf("%d modes believed, %d of them false\n", modes, false_modes);
+  EXPECT_EQ(false_modes, 0);
+}
+
+}  // namespace
+}  // namespace dashpot::identification
