@@ -76,7 +76,7 @@ class Inbox {
 };
 
 /// Answers statuses until the user, or the time, or a refusal ends it. In the first two cases the
-/// torque fades before that. Returns why it ended.
+/// arm stops and the torque fades before that. Returns why it ended.
 std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::DriverKind driver,
                      DriveSession& session) {
   constexpr int kWait = 50;       // ms
@@ -100,7 +100,7 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     if (!why.empty()) {
       if (!session.running() || options.dry_run) return why;
       if (asked == Clock::time_point()) asked = Clock::now();
-      if (since(asked) > session.fade_time() + 1) return why + ", without the driver";
+      if (since(asked) > session.end_time() + 1) return why + ", without the driver";
       session.end();
     }
     const int handled = bus.handleTimeout(kWait);
@@ -135,13 +135,14 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
           options.dry_run ? "watching; nothing is commanded" : "the arm is held where it is");
     }
     // The program may have been kept waiting since.
-    if (answers && session.may_send(utime_now())) {
+    if (answers && (session.may_send(utime_now()) || !session.engaged().empty())) {
       encode(driver, command, bytes);
       const int failed =
           bus.publish(profile.command_channel, bytes.data(), static_cast<unsigned>(bytes.size()));
       if (failed != 0) throw std::runtime_error("a command could not be sent");
       session.note_sent(bytes, 1e-6 * static_cast<double>(utime_now() - inbox.arrived));
     }
+    if (!session.engaged().empty()) throw std::runtime_error(session.engaged());
     const std::string warning = session.warning();
     if (!warning.empty()) print_error(warning);
   }
@@ -261,8 +262,8 @@ void add_drive(CLI::App& program) {
       ->option_text("FILE");
   command->add_flag("--json", options->json, "End with one JSON object instead of a table");
   command->footer(
-      "Read docs/drive.md first; begin with --dry-run. Ctrl-C ends it: the torque "
-      "fades, and the driver then does\nwhat it does without commands.\n" +
+      "Read docs/drive.md first; begin with --dry-run. Ctrl-C ends it: the arm "
+      "stops, the torque fades, and the\ndriver then does what it does without commands.\n" +
       std::string(kExitStatusHelp));
   command->callback([options] { drive(*options); });
 }

@@ -24,7 +24,10 @@ constexpr std::int64_t kSameClock = 1'000'000;  // us between the driver's clock
 constexpr std::int64_t kDrift = 1000;    // of a clock's time, by which the other one may differ
 constexpr double kNearLimit = 0.8;       // of an external torque with which the driver stops
 constexpr std::size_t kRemembered = 64;  // commands sent
-constexpr double kFade = 0.2;            // s from the springs to no torque, at least
+constexpr double kFade = 0.2;            // s from a stop to no torque, at least
+constexpr std::int64_t kLongestStop = 1'000'000;  // us: the torque fades then, whatever moves
+constexpr std::int64_t kLook = 100'000;           // us between two looks at an arm that stops
+constexpr double kStands = 1e-3;                  // rad between two looks at an arm that stands
 // us: what comes later is no time of a clock, and nanoseconds would not fit.
 constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() / 2000;
 
@@ -168,18 +171,40 @@ bool DriveSession::take(const DriverStatus& status, std::int64_t arrived, std::i
     if (journal_.record.fault != DASHPOT_OK) goal_.release();
     return false;
   }
-  if (journal_.record.faults > faults_) {
-    warning_ =
-        "a fault has latched, the arm is damped: " +
-        std::string(controller::to_text(static_cast<controller::Status>(journal_.record.fault)));
-  }
-  faults_ = journal_.record.faults;
+  note_fault(code);
   // On the driver's clock, by which the Panda's driver lets a command expire.
   command.utime = status.utime;
   // The message wants one; it is what the driver itself commands with --torque_only.
   command.position = options_.driver == DriverKind::kIiwa ? last_position_ : JointVector();
   command.torque = torque_;
+  if (controller_.needs_brakes(code)) engage(code, command);
   return true;
+}
+
+/// Tells of a fault, and of what is worse than it and comes later.
+void DriveSession::note_fault(std::int32_t code) {
+  const LoopRecord& record = journal_.record;
+  if (record.faults > faults_ || record.fault == DASHPOT_OK) told_ = DASHPOT_FAULT_LATCHED;
+  faults_ = record.faults;
+  if (record.fault == DASHPOT_OK) return;
+  const std::int32_t worst = std::max(code, record.fault);
+  if (worst <= told_) return;
+  told_ = worst;
+  warning_ = "a fault has latched, the arm is damped: " +
+             std::string(controller::to_text(static_cast<controller::Status>(worst)));
+}
+
+/// Ends the motion in the driver's way, with the last command. The Panda's driver ends at a command
+/// for another mode, with which libfranka ends the motion, and the robot holds itself. No message
+/// makes KUKA brake: after its last command, which has no torque, kuka_driver holds the arm.
+void DriveSession::engage(std::int32_t code, DriverCommand& command) {
+  const bool panda = options_.driver == DriverKind::kPanda;
+  command.torque.setZero();
+  if (panda) command.control_mode = 0;
+  engaged_ = std::string(controller::to_text(static_cast<controller::Status>(code))) + ": " +
+             (panda ? "the driver was made to end the motion"
+                    : "press the stop button, the driver cannot engage the robot's brakes") +
+             "; nothing more is sent";
 }
 
 /// LCM tells when it read a status, which may be long after that came: it looks for the kernel's
@@ -220,9 +245,30 @@ void DriveSession::note_repeated(const DriverStatus& status) {
                            " s: nothing more is sent");
 }
 
-/// Scales the torque to zero from the moment the end was asked for.
+void DriveSession::end() noexcept {
+  ending_ = true;
+  goal_.stop();
+}
+
+double DriveSession::end_time() const noexcept {
+  return 1e-6 * static_cast<double>(kLongestStop + fade_);
+}
+
+/// Whether the arm that stops has moved no more between two looks, or takes too long for it.
+bool DriveSession::stands(std::int64_t utime) {
+  if (!stopping_since_) stopping_since_ = utime;
+  if (utime - *stopping_since_ >= kLongestStop) return true;
+  if (seen_.size() > 0 && utime - seen_at_ < kLook) return false;
+  const bool stood = seen_.size() > 0 && (last_position_ - seen_).cwiseAbs().maxCoeff() < kStands;
+  seen_ = last_position_;
+  seen_at_ = utime;
+  return stood;
+}
+
+/// Scales the torque to zero from the moment the arm stands, once the end was asked for.
 void DriveSession::fade(std::int64_t utime) {
   if (!ending_) return;
+  if (!fading_since_ && !stands(utime)) return;
   if (!fading_since_) fading_since_ = utime;
   const double share = 1 - static_cast<double>(utime - *fading_since_) / static_cast<double>(fade_);
   torque_ *= std::clamp(share, 0.0, 1.0);

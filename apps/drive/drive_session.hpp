@@ -66,11 +66,13 @@ class DriveSession {
   /// What was sent, so that it is known when it is heard.
   void note_sent(const std::vector<std::uint8_t>& bytes, double latency);
 
-  /// From now on the torque fades, and is zero when it has ended.
-  void end() noexcept { ending_ = true; }
+  /// The arm stops, and then the torque fades: it is zero when this has ended.
+  void end() noexcept;
   bool ended() const noexcept { return ended_; }
-  /// How long the torque fades, s.
-  double fade_time() const noexcept { return 1e-6 * static_cast<double>(fade_); }
+  /// How long that takes at the most, s.
+  double end_time() const noexcept;
+  /// Why the robot needs its own brakes: the last command was sent that is to be. "": it does not.
+  const std::string& engaged() const noexcept { return engaged_; }
 
   bool running() const noexcept { return running_; }
   /// In one line what the user should know at once; "" if there is nothing new.
@@ -86,6 +88,9 @@ class DriveSession {
   double age(std::int64_t now) const noexcept;  ///< of the status that was taken, s
   void note_repeated(const lcmtypes::DriverStatus& status);
   void fade(std::int64_t utime);
+  bool stands(std::int64_t utime);
+  void note_fault(std::int32_t code);
+  void engage(std::int32_t code, lcmtypes::DriverCommand& command);
   void watch(const lcmtypes::DriverStatus& status, bool late);
   void begin(const lcmtypes::DriverStatus& status);
   void check_period();
@@ -118,8 +123,12 @@ class DriveSession {
   std::int64_t quiet_until_ = 0;  ///< utime of the first status to be answered again
   bool ending_ = false, ended_ = false;
   std::int64_t fade_;  ///< us
-  std::optional<std::int64_t> fading_since_;
-  std::int64_t faults_ = 0;  ///< that the user was told of
+  std::optional<std::int64_t> stopping_since_, fading_since_;
+  std::int64_t seen_at_ = 0;        ///< while it stops: utime of seen_
+  JointVector seen_;                ///< where it was then
+  std::int64_t faults_ = 0;         ///< so far
+  std::int32_t told_ = DASHPOT_OK;  ///< the worst status since the fault that the user was told of
+  std::string engaged_;
   JointVector torque_;
   std::deque<std::vector<std::uint8_t>> sent_;  ///< the last ones
   std::string warning_;

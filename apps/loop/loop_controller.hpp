@@ -24,6 +24,10 @@ class LoopController {
   virtual std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
                               const controller::Setpoint* setpoint,
                               JointVector& torque) noexcept = 0;
+  /// Stops the arm: the set-point is given up, until there is a new one.
+  virtual void stop() noexcept = 0;
+  /// Whether a status of update() asks the host to engage the robot's own brakes.
+  virtual bool needs_brakes(std::int32_t status) const noexcept = 0;
   /// Returns the snapshot of the last tick.
   virtual const dashpot_snapshot& snapshot() noexcept = 0;
   /// Returns modes that are newer than those returned last; null if there are none.

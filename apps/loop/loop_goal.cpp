@@ -31,7 +31,7 @@ const controller::Setpoint* LoopGoal::told(std::int64_t time) noexcept {
     if (wrench != excited_.wrench) news_ = true;
   }
   if (news_) setpoint_.time = time;
-  told_ = in_force_;
+  told_ = in_force_ && !stopped_;
   if (!told_) return nullptr;
   if (!excitation_) return &setpoint_;
   if (news_) excited_ = setpoint_;

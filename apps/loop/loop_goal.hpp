@@ -39,6 +39,11 @@ class LoopGoal {
   void note_status(std::int32_t status) noexcept;
   /// Goes there from the next tick on, with a pose of tool(). The gains of `setpoint` do not count.
   void hold(const controller::Setpoint& setpoint) noexcept;
+  /// Stops the arm, for good: nothing is told from now on.
+  void stop() noexcept {
+    if (!stopped_) controller_.stop();
+    stopped_ = true;
+  }
   /// What the controller was told to hold last.
   const controller::Setpoint& setpoint() const noexcept { return setpoint_; }
   /// T in the tip link, of the pose in setpoint().
@@ -85,10 +90,11 @@ class LoopGoal {
   std::optional<Excitation> excitation_;
   std::optional<std::int64_t> excited_since_;  ///< ns
   controller::Setpoint accepted_;              ///< the last that the controller did not reject
-  bool in_force_ = false;                      ///< of setpoint_
-  bool news_ = true;                           ///< setpoint_ is to be read again
-  bool told_ = false;                          ///< the controller was told of it in this tick
-  bool faulted_ = false;                       ///< a fault was latched after the last tick
+  bool stopped_ = false;
+  bool in_force_ = false;  ///< of setpoint_
+  bool news_ = true;       ///< setpoint_ is to be read again
+  bool told_ = false;      ///< the controller was told of it in this tick
+  bool faulted_ = false;   ///< a fault was latched after the last tick
   std::int64_t ticks_ = 0;
   std::int64_t gain_changes_seen_ = 0;
   controller::Pose tool_;  ///< T in the tip link, of the poses above

@@ -67,6 +67,8 @@ class NullController : public LoopController {
     return DASHPOT_OK;
   }
 
+  void stop() noexcept override {}
+  bool needs_brakes(std::int32_t) const noexcept override { return false; }
   const dashpot_snapshot& snapshot() noexcept override { return snapshot_; }
 
   const dashpot_modes* new_modes() noexcept override {

@@ -40,6 +40,11 @@ class PluginController : public LoopController {
     return plugin_.update(handle_.get(), &state, &wanted, &output);
   }
 
+  void stop() noexcept override { plugin_.stop(handle_.get()); }
+  bool needs_brakes(std::int32_t status) const noexcept override {
+    return plugin_.needs_brakes(status) != 0;
+  }
+
   const dashpot_snapshot& snapshot() noexcept override {
     plugin_.read_snapshot(handle_.get(), &snapshot_);
     return snapshot_;

@@ -36,10 +36,11 @@ class StatusWriter {
     next.robot_mode = 2;
   }
 
-  /// The next status, a millisecond after the last one. Returns true if its command came within
-  /// `patience`, ms.
+  /// The next status, a millisecond after the last one, with some bit changed. Returns true if its
+  /// command came within `patience`, ms.
   bool step(int patience) {
     next.utime += 1000;
+    if (!frozen) next.position[6] += next.utime % 2000 == 0 ? 1e-13 : -1e-13;
     return send(next, patience);
   }
   bool send(const DriverStatus& status, int patience) {
@@ -82,6 +83,7 @@ class StatusWriter {
   }
 
   DriverStatus next;
+  bool frozen = false;
   std::vector<DriverCommand> commands;
 
  private:
@@ -154,6 +156,31 @@ TEST_P(DriveStatuses, TheTorqueFadesBeforeTheEnd) {
     then = command.utime;
   }
   EXPECT_EQ(before, 0);  // this is what the driver holds until the command expires
+}
+
+TEST_P(DriveStatuses, AnArmThatNeedsItsBrakesEndsIt) {
+  begin();
+  writer.next.velocity[0] = 1;
+  for (int k = 0; k < 100; ++k) {  // the springs pull, and what damps ends as the motion does
+    writer.next.position[0] += 1e-3;
+    writer.step(100);
+  }
+  writer.frozen = true;
+  const auto end = Clock::now() + std::chrono::seconds(30);
+  while (!driving.ended() && Clock::now() < end) writer.step(100);
+  driving.send(SIGTERM);  // for the case that it goes on
+  EXPECT_EQ(driving.finish(), 1);
+  const Json result = Json::parse(driving.output());
+  for (const std::string& said : {driving.complaints(), result["ended"].get<std::string>()}) {
+    EXPECT_THAT(said, HasSubstr("state frozen"));
+    EXPECT_THAT(said, HasSubstr("nothing more is sent"));
+  }
+  EXPECT_EQ(result["tick_statuses"]["state frozen, holding the weight"], 1) << result.dump(2);
+  const DriverCommand& last = writer.commands.back();
+  EXPECT_TRUE(last.torque.size() == 7 && last.torque.isZero(0)) << last.torque.transpose();
+  const bool panda = arm.kind == DriverKind::kPanda;
+  EXPECT_EQ(last.control_mode, panda ? 0 : 4);  // the Panda's driver ends at another one
+  if (!panda) EXPECT_EQ(last.position, writer.next.position);
 }
 
 TEST_P(DriveStatuses, ADriverThatWasRestartedIsNotAnsweredAtOnce) {

@@ -126,6 +126,47 @@ TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
   hold_and_move();
 }
 
+/// SIGTERM reaches an arm on its way: its torque fades where it stands.
+TEST_P(Drive, StopsTheArmBeforeTheTorqueFades) {
+  const Scratch scratch;
+  const std::string config = changed_configuration(
+      scratch, arm,
+      {{"analysis:",  // gaps are for a machine that is busy
+        "commands: {silence: 30 s, oldest: 20 s}\nwatchdog: {longest_gap: 200 ms}\nanalysis:"}});
+  Listener listener(url);
+  Running fake(driver());
+  const std::string log = scratch.path("drive.lcm");
+  Running driving(drive(config, {"--commands", "--log", log}));
+  if (!listener.until([&] { return listener.states > 100; })) GTEST_SKIP() << kNoMulticast;
+  std::int64_t sent = -1;
+  ASSERT_TRUE(listener.until([&] {
+    if (listener.state.commander == 0 && (sent < 0 || listener.states - sent > 500)) {
+      sent = listener.states;
+      const command_t command =
+          joint_command(listener.state, listener.state.reference_joint_position[0] + 1, utime());
+      listener.bus().publish(lcmtypes::kCommandChannel, &command);
+    }
+    return listener.state.joint_velocity[0] > 0.1;
+  }));
+  driving.send(SIGTERM);
+  EXPECT_EQ(summary_of(driving)["ended"], "ended by the user");
+  fake.send(SIGTERM);
+  const std::vector<state_t> states = states_of(log);
+  const auto stops = std::find_if(states.begin(), states.end(), [](const state_t& one) {
+    return one.status == DASHPOT_SETPOINT_LOST;
+  });
+  ASSERT_NE(stops, states.end());
+  const double way = states.back().joint_position[0] - stops->joint_position[0];
+  EXPECT_LT(std::abs(way), 0.02) << "from " << stops->joint_velocity[0] << " rad/s";
+  double fastest = 0;
+  for (const state_t& one : states) {
+    const bool fades = one.utime > states.back().utime - 190'000;
+    if (fades) fastest = std::max(fastest, std::abs(one.joint_velocity[0]));
+  }
+  EXPECT_LT(fastest, 0.01);
+  EXPECT_GT(stops->joint_velocity[0], 0.05);
+}
+
 /// Other arms behind the same drivers.
 class DriveToo : public Drive {};
 TEST_P(DriveToo, HoldsTheArmAndMovesItWhereItIsTold) {
