@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -25,7 +26,8 @@
 namespace dashpot::hosts {
 namespace {
 
-constexpr std::array<const char*, 5> kAttributes = {"config", "prefix", "goal", "base", "lcm_url"};
+constexpr std::array<const char*, 6> kAttributes = {"config", "prefix",  "goal",
+                                                    "base",   "lcm_url", "release"};
 
 std::string attribute(const mjModel* model, int instance, const char* name) {
   const char* const text = mj_getPluginConfig(model, instance, name);
@@ -43,6 +45,7 @@ class Arm {
     if (!controller_) throw std::runtime_error(dashpot_last_error());
     find_joints(model, attribute(model, instance, "prefix"));
     find_bodies(model, instance);
+    find_release(model, attribute(model, instance, "release"));
     if (model->opt.integrator == mjINT_RK4) {
       throw std::runtime_error("integrator: RK4 has states between steps, on which no tick can be");
     }
@@ -90,6 +93,7 @@ class Arm {
       if (!started_) begin_ = step;
       step_ = step;
       started_ = true;
+      take_release(data);
       tick(data);
     }
     for (std::size_t i = 0; i < joints_.size(); ++i) {
@@ -166,6 +170,22 @@ class Arm {
     }
   }
 
+  void find_release(const mjModel* model, const std::string& index) {
+    if (index.empty()) return;
+    const char* const end = index.data() + index.size();
+    const auto [rest, error] = std::from_chars(index.data(), end, release_);
+    if (error == std::errc() && rest == end && release_ >= 0 && release_ < model->nuserdata) return;
+    throw std::runtime_error("release: '" + index + "' is no index of userdata, which has " +
+                             std::to_string(model->nuserdata) + " numbers");
+  }
+
+  /// A number that is not zero releases a fault once, and is zero again.
+  void take_release(mjData* data) const noexcept {
+    if (release_ < 0 || data->userdata[release_] == 0) return;
+    data->userdata[release_] = 0;
+    dashpot_release(controller_.get());
+  }
+
   void tick(const mjData* data) {
     const auto n = static_cast<std::uint32_t>(joints_.size());
     const std::int64_t time = std::llround(1e9 * data->time);
@@ -192,6 +212,7 @@ class Arm {
   void read() {
     const std::uint64_t modes = modes_.tick, sampled = sampled_.tick;
     if (dashpot_read_snapshot(controller_.get(), &snapshot_) != DASHPOT_OK) return;
+    tell_of_brakes();
     state_.utime = snapshot_.time / 1000;  // by the simulation's clock
     lcmtypes::fill(snapshot_, state_.snapshot);
     const bool faulty = snapshot_.fault != DASHPOT_OK;
@@ -212,10 +233,22 @@ class Arm {
     }
   }
 
+  /// Once for each fault.
+  void tell_of_brakes() noexcept {
+    const bool needed = dashpot_needs_brakes(snapshot_.status) != 0;
+    if (needed && !told_) {
+      std::fprintf(stderr, "dashpot.impedance: %s: a robot would have to engage its brakes\n",
+                   dashpot_status_text(snapshot_.status));
+    }
+    told_ = needed || (told_ && snapshot_.fault != DASHPOT_OK);
+  }
+
   std::unique_ptr<dashpot_controller, Destroy> controller_;
   std::vector<int> joints_;  ///< of the model, from the base to the tip
   int goal_ = -1;            ///< body whose pose is the set-point; -1: none
   int base_ = 0;             ///< body that is the base link; 0: the world
+  int release_ = -1;         ///< index in userdata; -1: none
+  bool told_ = false;        ///< that a robot would need its brakes
   std::int64_t every_ = 1;   ///< steps of the model from tick to tick
   std::int64_t begin_ = 0;   ///< step of the first tick
   std::int64_t step_ = 0;    ///< of the last tick

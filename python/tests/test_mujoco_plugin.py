@@ -171,12 +171,42 @@ def test_each_data_has_an_arm_of_its_own(tmp_path):
         assert data.sensordata[1] == 0
 
 
+def test_a_number_in_userdata_releases_a_fault(tmp_path):
+    model, data = model_of(tmp_path, more='<size nuserdata="2"/>', release=1)
+
+    def fault_after(steps):
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+        return dashpot.Status(round(data.sensordata[1]))
+    assert fault_after(10) == dashpot.Status.OK
+    data.qvel[0] = 3
+    assert fault_after(1000) == dashpot.Status.VELOCITY_LIMIT
+    data.userdata[:] = 1
+    assert fault_after(1) == dashpot.Status.OK and data.userdata.tolist() == [1, 0]
+    data.qvel[0] = 3
+    assert fault_after(100) == dashpot.Status.VELOCITY_LIMIT  # one number releases one fault
+    mujoco.mj_resetData(model, data)
+    data.qpos[:7] = HOME
+    assert fault_after(10) == dashpot.Status.OK
+
+
+def test_an_arm_that_needs_its_brakes_is_named_once(tmp_path, capfd):
+    model, data = model_of(tmp_path)
+    for _ in range(300):
+        mujoco.mj_step(model, data)
+        data.qpos[:7], data.qvel[:7] = HOME, 0.1  # as feedback that is frozen
+    said = capfd.readouterr().err
+    assert said.count("would have to engage its brakes") == 1 and "state frozen" in said
+
+
 @pytest.mark.parametrize("attributes, reason", [
     ({"config": "nowhere.yaml"}, "nowhere.yaml"),
     ({"prefix": "other_"}, "the model has no joint 'other_panda_joint1'"),
     ({"goal": "moon"}, "the model has no body 'moon'"),
     ({"integrator": "RK4"}, "RK4 has states between steps"),
     ({"period": "1.5 ms"}, "no multiple of the model's timestep"),
+    ({"release": "0"}, "'0' is no index of userdata, which has 0 numbers"),
+    ({"release": "1x"}, "'1x' is no index of userdata"),
     ({"lcm_url": "nonsense"}, "nonsense")])
 def test_what_does_not_fit_is_refused(attributes, reason, tmp_path, capfd):
     with pytest.raises(Exception):
