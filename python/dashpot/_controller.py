@@ -59,6 +59,11 @@ class Status(enum.IntEnum):
         """A short English text."""
         return _core.status_text(int(self))
 
+    @property
+    def needs_brakes(self) -> bool:
+        """True if the host has to end the motion at once and to engage the robot's own brakes."""
+        return _core.needs_brakes(int(self))
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Setpoint(Result):
@@ -208,6 +213,42 @@ def nanoseconds(time: float) -> int:
     return round(1e9 * time)
 
 
+class Ending:
+    """How a loop ends: the arm stops, and then its torque fades to nothing."""
+
+    LONGEST = 1.0  # s; the torque fades then, whatever moves
+    LOOK = 0.1  # s between two looks at an arm that stops
+    STANDS = 1e-3  # rad between two looks at an arm that stands
+
+    def __init__(self, controller: Controller, fade: float) -> None:
+        """`fade`: how long the torque fades, s."""
+        self._controller = controller
+        self._fade = fade
+        self._began: int | None = None  # ns
+        self._fading: int | None = None  # since when, ns
+        self._seen: tuple[int, Array] | None = None  # ns, and where the arm was then
+
+    def begin(self, ns: int) -> None:
+        """Before the tick at `ns`; the first call stops the arm."""
+        if self._began is None:
+            self._began = ns
+            self._controller.stop()
+
+    def left(self, ns: int, q: Array) -> float:
+        """After that tick: the share of its torque that is to act, 0 at the end."""
+        if self._fading is None and self._stands(ns, q):
+            self._fading = ns
+        return 1.0 if self._fading is None else max(0.0, 1 - 1e-9 * (ns - self._fading) / self._fade)
+
+    def _stands(self, ns: int, q: Array) -> bool:
+        if ns - (self._began or 0) >= 1e9 * self.LONGEST:
+            return True
+        if self._seen is not None and ns - self._seen[0] < 1e9 * self.LOOK:
+            return False
+        before, self._seen = self._seen, (ns, np.array(q))
+        return before is not None and float(np.abs(q - before[1]).max()) < self.STANDS
+
+
 def _column(values: npt.ArrayLike | None) -> Array | None:
     return None if values is None else np.asarray(values, dtype=np.float64).reshape(-1, 1)
 
@@ -215,7 +256,7 @@ def _column(values: npt.ArrayLike | None) -> Array | None:
 class Controller:
     """Impedance controller of one arm with n joints, the same that a host loads as plugin.
 
-    One thread calls `update` and `reset`, others may call the rest. Call `start` before the loop, so
+    One thread calls `update`, `stop` and `reset`, others may call the rest. Call `start` before the loop, so
     that gains are judged where the robot is:
 
         controller = dashpot.Controller("controller/examples/panda.yaml")
@@ -271,6 +312,10 @@ class Controller:
         """Forgets history, faults and set-point, but not the gains. The torque-rate limit counts
         from `torque` (n, N m; None: the last one)."""
         self._core.reset(_column(to_vector("torque", torque)))
+
+    def stop(self) -> None:
+        """Stops the arm, before the loop ends: the set-point is given up, until there is a new one."""
+        self._core.stop()
 
     def release(self) -> None:
         """Releases a latched fault at the next tick, unless its cause is still present."""

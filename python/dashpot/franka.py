@@ -22,13 +22,13 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from ._controller import Controller, Setpoint, Status
+from ._controller import Controller, Ending, Setpoint, Status
 from ._core import Error
 from ._libfranka import (MODES, Answers, RobotStopped, Wire, advice, check_loop, exceptions,
                          is_realtime, open_files, undisturbed)
 
 WATCH = 0.3  # s of states before the start
-FADE = 0.2  # s from the springs to no torque, at least
+FADE = 0.2  # s from a stop to no torque, at least
 REPEAT = 100  # ticks from one repetition of a set-point to the next
 TIP_TOLERANCE = 0.02  # m between the configuration's tip and the robot's end effector
 SILENCE = 1.0  # s without a state, after which the robot is given up
@@ -55,8 +55,8 @@ class Session:
         self.tip_distance = 0.0  # m, from the configuration's tip to the robot's end effector
         self.success_rate = self.least_success_rate = 1.0
         loop = check_loop(self.controller)
-        self._fade = max(FADE, float(np.max(loop["torque"] / loop["torque_rate"])))
-        self._fading: int | None = None  # since when, ns
+        self._ending = Ending(self.controller,
+                              max(FADE, float(np.max(loop["torque"] / loop["torque_rate"]))))
         self._urls = tuple(urls)
         self._publish = publish
         self._goal: Any = None  # parts of the set-point in force
@@ -67,13 +67,15 @@ class Session:
 
     def set_setpoint(self, setpoint: Setpoint | None = None, **parts: Any) -> None:
         """Sets where the arm is to go: a Setpoint, or what makes one. It stays in force until the
-        next one, or a fault."""
+        next one, or a fault. Raises Error for one that is not possible."""
         wanted = Setpoint(**parts) if setpoint is None else setpoint
+        goal = wanted._parts()[:4]
+        self.controller._core.check_setpoint(*goal)
         with self._lock:
-            self._goal, self._news = wanted._parts()[:4], True
+            self._goal, self._news = goal, True
 
     def stop(self, why: str = "ended by the user", *, at_once: bool = False) -> None:
-        """Ends the loop: the torque fades first, unless it is to end at once."""
+        """Ends the loop: the arm stops and the torque fades first, unless it is to end at once."""
         self._now = self._now or at_once
         self._stop = self._stop or why
 
@@ -176,6 +178,8 @@ class Session:
                 self.stop("ended after its time")
             q[:], qd[:] = state.q, state.dq
             ns = 1_000_000 * round(1e3 * now)
+            if self._stop and not self.dry_run:
+                self._ending.begin(ns)
             torque, status = update(ns, q, qd, self._setpoint(ns), None)
             self.statuses[status] += 1
             if status >= latched or self.fault:
@@ -184,23 +188,29 @@ class Session:
                 if self._stop:
                     return self._stop
                 continue
-            self._write(control, torques, torque.tolist(), ns)
+            if status >= latched and Status(status).needs_brakes:
+                self._engage(franka, control, torques, torque.tolist(), status)
+            left = 1.0 if not self._stop else 0.0 if self._now else self._ending.left(ns, q)
+            torques.motion_finished = left == 0
+            torques.tau_J = (left * torque).tolist()
+            control.writeOnce(torques)
+            self.sent += 1
             self.answers.add(time.time_ns() - arrived)
             self._note_rate(state.control_command_success_rate)
             if torques.motion_finished:
                 return str(self._stop)
 
-    def _write(self, control: Any, torques: Any, values: list[float], ns: int) -> None:
-        """Sends torques, which fade from the first state at which the loop is to end."""
-        if self._stop:
-            if self._fading is None:
-                self._fading = ns
-            left = 0.0 if self._now else max(0.0, 1 - (ns - self._fading) / (1e9 * self._fade))
-            values = [left * value for value in values]
-            torques.motion_finished = left == 0
-        torques.tau_J = values
-        control.writeOnce(torques)
-        self.sent += 1
+    def _engage(self, franka: Any, control: Any, torques: Any, values: list[float],
+                status: int) -> None:
+        """Ends the motion at once, so that the robot holds itself, and raises RobotStopped."""
+        reason = f"{Status(status).text}: the motion was ended, look at the robot before the next start"
+        torques.tau_J, torques.motion_finished = values, True
+        try:
+            control.writeOnce(torques)
+            self.sent += 1
+        except exceptions(franka) as error:
+            reason += "; " + advice(str(error), self.robot)
+        raise RobotStopped(reason)
 
     def _note_rate(self, rate: float) -> None:
         self.success_rate = rate
@@ -209,7 +219,7 @@ class Session:
 
     def _setpoint(self, ns: int) -> Any:
         """The set-point for the tick at `ns`, as the core takes it; None keeps the one in force."""
-        if not self._news and (self._goal is None or self.states % REPEAT):
+        if self._stop or not self._news and (self._goal is None or self.states % REPEAT):
             return None
         with self._lock:
             self._news = False
@@ -220,10 +230,11 @@ class Session:
             self.fault = Status.OK
             return
         if self.fault == Status.OK:
-            self.fault = Status(status)
             self.faults += 1
             with self._lock:
                 self._goal, self._news = None, False
+        if status > self.fault:  # the worst is told, not what came first
+            self.fault = Status(status)
             if not self.dry_run:
                 print(f"dashpot.franka: a fault, the arm is damped: {self.fault.text}",
                       file=sys.stderr, flush=True)
@@ -293,8 +304,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The program. Returns its exit status: 2 for input that is refused, 1 for a robot that stops."""
     parser = argparse.ArgumentParser(
         prog="python -m dashpot.franka", description=str(__doc__).split(":")[0] + ".",
-        epilog="Read docs/franka.md first; begin with --dry-run. Ctrl-C ends it: the torque fades; the "
-        "second one ends it at once.")
+        epilog="Read docs/franka.md first; begin with --dry-run. Ctrl-C ends it: the arm stops and the "
+        "torque fades; the second one ends it at once.")
     parser.add_argument("config", metavar="CONFIG", help="configuration file of the controller")
     parser.add_argument("--robot", metavar="ADDRESS", required=True, help="of the robot")
     parser.add_argument("--dry-run", action="store_true",

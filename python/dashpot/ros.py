@@ -15,7 +15,7 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from ._controller import Controller, Status
+from ._controller import Controller, Ending, Status
 from ._core import Error
 
 GAINS = ("joint_stiffness", "joint_damping", "joint_damping_ratio", "task_stiffness",
@@ -25,7 +25,7 @@ RINGS = 0.2  # ratio of damping below which a mode counts as one that rings
 ARROW = 0.3  # m, of the marker
 WATCHED = 50  # states before the torque begins
 PERIOD_TOLERANCE = 0.2  # of the period
-FADE = 0.2  # s from the springs to no torque
+FADE = 0.2  # s from a stop to no torque
 
 
 class ModesNode:
@@ -51,7 +51,7 @@ class ModesNode:
         self._stamps: list[int] = []
         self._started = False
         self._warned = False
-        self._ending: int | None = None  # ns, when fading began
+        self._ending = Ending(self.controller, FADE)
         self._stop = False
         empty: list[float] = []
         for name in GAINS:
@@ -88,7 +88,7 @@ class ModesNode:
         return found
 
     def stop(self) -> None:
-        """Ends the node; a torque fades first, unless this is called again."""
+        """Ends the node; the arm stops and the torque fades first, unless this is called again."""
         self.ended = self.ended or self._stop or not self._started
         self._stop = True
 
@@ -161,6 +161,8 @@ class ModesNode:
                 self._fail(f"gains: {error}")
                 return
             self._started = True
+        if self._stop and not self.dry_run:
+            self._ending.begin(time)
         torque, status = self.controller.update(time, self._q, velocity)
         self.statuses[status] += 1
         if self.dry_run:
@@ -168,12 +170,12 @@ class ModesNode:
                 self.controller.release()
             self.ended = self.ended or self._stop
             return
-        if self._stop:
-            if self._ending is None:
-                self._ending = time
-            left = max(0.0, 1 - 1e-9 * (time - self._ending) / FADE)
-            torque = left * torque
-            self.ended = left == 0
+        left = self._ending.left(time, self._q) if self._stop else 1.0
+        if status.needs_brakes:  # a topic has no brakes: nothing pulls any more
+            self._fail(f"{status.text}: the last torque was zero")
+            left = 0.0
+        torque = left * torque
+        self.ended = left == 0
         assert self._torque is not None
         self._torque.publish(self.msg["std_msgs"].Float64MultiArray(data=torque.tolist()))
         self.torques += 1
@@ -301,7 +303,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"torques commanded: {modes.torques}")
     if modes.failure:
         print(f"dashpot.ros: {modes.failure}", file=sys.stderr)
-        return 2
+        return 1 if modes.torques else 2
     return 0
 
 

@@ -2,7 +2,9 @@
 
 #include <dashpot/lcmtypes/plugin_publisher.h>
 #include <dashpot/controller/plugin/hosted_controller.hpp>
+#include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/controller/rotors.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/python/src/controller_results.hpp>
 
 #include <algorithm>
@@ -212,6 +214,24 @@ void reset(Host& host, const OptionalMatrix& torque) {
   }
 }
 
+/// Raises for a set-point that is not possible.
+void check_setpoint(const Host& host, bool cartesian, const OptionalMatrix& joint_position,
+                    const OptionalMatrix& tip_pose, const OptionalMatrix& wrench) {
+  const SetpointData setpoint(host, cartesian, joint_position, tip_pose, wrench, 0);
+  const controller::Settings& settings = host.get()->settings;
+  controller::Setpoint wanted = settings.initial;
+  const std::int32_t code = controller::to_setpoint(&setpoint.given, host.get()->n, 0, wanted);
+  if (code != DASHPOT_OK) throw std::invalid_argument(dashpot_status_text(code));
+  const controller::SetpointFault fault = controller::check_setpoint(wanted, settings.limits, true);
+  if (fault) throw std::invalid_argument(std::string(fault.key) + " " + fault.reason);
+}
+
+void stop(Host& host) {
+  const nb::gil_scoped_release release;
+  const std::lock_guard lock(host.loop);
+  dashpot_stop(host.get());
+}
+
 void set_setpoint(Host& host, bool cartesian, const OptionalMatrix& joint_position,
                   const OptionalMatrix& tip_pose, const OptionalMatrix& wrench,
                   std::optional<std::int64_t> time) {
@@ -321,6 +341,7 @@ nb::dict loop_of(const Host& host) {
 
 void add_controller(nb::module_& m) {
   m.def("status_text", [](int status) { return dashpot_status_text(status); });
+  m.def("needs_brakes", [](int status) { return dashpot_needs_brakes(status) != 0; });
   nb::class_<Host>(m, "Controller", "dashpot_controller of controller/plugin.h")
       .def_static("from_text", &from_text, nb::call_guard<nb::gil_scoped_release>())
       .def_static("from_file", &from_file, nb::call_guard<nb::gil_scoped_release>())
@@ -338,6 +359,9 @@ void add_controller(nb::module_& m) {
            nb::arg("setpoint").none(), nb::arg("external_wrench").none())
       .def("start", &start, nb::arg("q"), nb::arg("torque").none())
       .def("reset", &reset, nb::arg("torque").none())
+      .def("stop", &stop)
+      .def("check_setpoint", &check_setpoint, nb::arg("cartesian"),
+           nb::arg("joint_position").none(), nb::arg("tip_pose").none(), nb::arg("wrench").none())
       .def("set_setpoint", &set_setpoint, nb::arg("cartesian"), nb::arg("joint_position").none(),
            nb::arg("tip_pose").none(), nb::arg("wrench").none(), nb::arg("time").none())
       .def("set_gains", &set_gains, nb::arg("gains"))
