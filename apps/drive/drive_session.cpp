@@ -166,6 +166,7 @@ bool DriveSession::take(const DriverStatus& status, std::int64_t arrived, std::i
                      static_cast<std::int32_t>(
                          std::min<std::int64_t>(took, std::numeric_limits<std::int32_t>::max())));
   journal_.end_tick();
+  if (ending_) journal_.record.last_modes = modes_;  // a brake has none to tell of
   fade(status.utime);
   if (options_.dry_run) {  // somebody else moves the arm as he likes: that is no fault of this loop
     if (journal_.record.fault != DASHPOT_OK) goal_.release();
@@ -246,6 +247,7 @@ void DriveSession::note_repeated(const DriverStatus& status) {
 }
 
 void DriveSession::end() noexcept {
+  if (!ending_) modes_ = journal_.record.last_modes;
   ending_ = true;
   goal_.stop();
 }

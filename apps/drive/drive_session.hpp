@@ -122,6 +122,7 @@ class DriveSession {
   bool restarted_ = false;        ///< the driver's clock was not known while this ran
   std::int64_t quiet_until_ = 0;  ///< utime of the first status to be answered again
   bool ending_ = false, ended_ = false;
+  dashpot_modes modes_{};  ///< of the springs, before the end
   std::int64_t fade_;  ///< us
   std::optional<std::int64_t> stopping_since_, fading_since_;
   std::int64_t seen_at_ = 0;        ///< while it stops: utime of seen_
