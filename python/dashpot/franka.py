@@ -242,8 +242,9 @@ class Session:
             self.controller.release()
 
     def _report(self, ended: str, failure: str | None) -> dict[str, Any]:
-        found = self.controller.modes() if self.running else None
         snapshot = self.controller.snapshot() if self.running else None
+        # At the last posture, with the springs: those of the last tick are the brake's.
+        found = None if snapshot is None else self.controller.modes_at(snapshot.position)
         return {
             "driver": "libfranka", "robot": self.robot, "dry_run": self.dry_run,
             "running": self.running, "ended": ended, "failure": failure, "period": self.period,
