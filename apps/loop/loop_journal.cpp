@@ -1,3 +1,4 @@
+#include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/apps/loop/loop_journal.hpp>
 #include <dashpot/lcmtypes/plugin_samples.hpp>
 
@@ -73,8 +74,11 @@ void LoopJournal::publish(std::int64_t utime) noexcept {
   bool publish_now = record.ticks % kPublishEvery == 0;
   const dashpot_modes* modes = controller_.new_modes();
   if (modes != nullptr && modes->time >= 0) {  // not of the hand's guidance
-    if (record.first_modes.tick == 0) record.first_modes = *modes;
-    record.last_modes = *modes;
+    awaits_modes_ = modes->status == static_cast<std::int32_t>(analysis::Status::kUnfinished);
+    if (!awaits_modes_) {
+      if (record.first_modes.tick == 0) record.first_modes = *modes;
+      record.last_modes = *modes;
+    }
     // They may belong to an earlier tick.
     modes_.utime = utime - (snapshot.time - modes->time) / 1000;
     lcmtypes::fill(*modes, modes_);

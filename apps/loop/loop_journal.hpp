@@ -25,8 +25,8 @@ struct LoopRecord {
   std::int64_t faults = 0;            ///< how often one latched
   std::int32_t fault = DASHPOT_OK;    ///< that is latched; DASHPOT_OK: none
   std::int64_t fault_tick = 0;        ///< when it latched; 0: there is none
-  dashpot_modes first_modes{};        ///< tick 0: there were none
-  dashpot_modes last_modes{};
+  dashpot_modes first_modes{};        ///< the first that were found; tick 0: none were
+  dashpot_modes last_modes{};         ///< the last that were found
   bool cartesian = false;  ///< Cartesian springs were in force
   bool joint = false;      ///< joint springs were in force
   // The largest distances between where these springs are fixed and where the robot is:
@@ -58,6 +58,8 @@ class LoopJournal {
   /// After a tick at `utime`, us since 1970-01-01 UTC, that computed for `tick_time` ns, before it
   /// counts. `overran`: it ended after its period.
   void note_tick(std::int64_t utime, std::int32_t status, std::int32_t tick_time) noexcept;
+  /// True while the background thread still solves the modes of an earlier tick.
+  bool awaits_modes() const noexcept { return awaits_modes_; }
   /// The tick is over.
   void end_tick() noexcept { ++record.ticks; }
 
@@ -74,6 +76,7 @@ class LoopJournal {
   lcmtypes::Publisher& publisher_;
   CommandSource* commands_;
   Pace pace_;
+  bool awaits_modes_ = false;
   bool released_ = false;  ///< this tick takes up the release of a fault
   std::int32_t last_status_ = DASHPOT_OK;
   std::uint64_t first_restarts_ = 0;

@@ -11,6 +11,9 @@ namespace dashpot::apps {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;  // ns
+// Without real time the loop waits for the thread that solves the modes, longer with each tick
+// that has to, because a busy machine gives that thread the processor late.
+constexpr std::int64_t kPause = 50'000, kLongestPause = kSecond;  // ns
 
 std::int64_t now(clockid_t clock) noexcept {
   timespec time{};
@@ -61,10 +64,13 @@ void LoopThread::run() noexcept {
   loop_.controller().snapshot();  // what a first call allocates, see plugin.h
   const std::int64_t period = std::llround(1e9 * options_.period);
   std::int64_t deadline = now(CLOCK_MONOTONIC) + period;
+  std::int64_t pause = 0;
   while (!stop_ && journal_.record.ticks < options_.ticks &&
          journal_.record.simulation == sim::Status::kOk) {
     if (!real_time) {
       tick((journal_.record.ticks * period) / 1000);
+      pause = journal_.awaits_modes() ? std::min(std::max(2 * pause, kPause), kLongestPause) : 0;
+      if (pause > 0) sleep_until(now(CLOCK_MONOTONIC) + pause);
       continue;
     }
     sleep_until(deadline);

@@ -17,7 +17,8 @@ using Pace = LoopJournal::Pace;
 /// than a tick back is given up, and counted as an overrun. The loop allocates nothing, and waits
 /// for nothing but its deadlines: the gains of the scenario are left to another thread, which calls
 /// ClosedLoop::follow_gains. Only without real time it has them judged and publishes on its own
-/// thread, so that no message is lost.
+/// thread, so that no message is lost, and waits for modes that a background thread still solves,
+/// so that they do not depend on the speed of the machine.
 class LoopThread {
  public:
   struct Options {

@@ -52,8 +52,9 @@ class PluginController : public LoopController {
 
   const dashpot_modes* new_modes() noexcept override {
     const std::uint64_t last = modes_.tick;
+    const std::int32_t status = modes_.status;  // unfinished until a thread has solved them
     if (plugin_.read_modes(handle_.get(), &modes_) != DASHPOT_OK) return nullptr;
-    return modes_.tick == last ? nullptr : &modes_;
+    return modes_.tick == last && modes_.status == status ? nullptr : &modes_;
   }
 
   const dashpot_sampled_modes* new_sampled_modes() noexcept override {

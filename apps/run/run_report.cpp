@@ -38,8 +38,18 @@ std::string status_text(std::size_t status) {
   return controller::to_text(static_cast<controller::Status>(status));
 }
 
-std::string modes_table(const dashpot_modes& modes) {
-  return table_of(loop_modes(modes), mode_fields());
+/// The modes near `tick`, with their time where they belong to a much earlier or later one.
+std::string modes_text(const char* when, const dashpot_modes& modes, std::int64_t tick,
+                       double period) {
+  constexpr double kNear = 0.1;  // s
+  const double apart = static_cast<double>(static_cast<std::int64_t>(modes.tick) - tick) * period;
+  std::string out = std::string("\nModes at the ") + when + ", ";
+  if (std::abs(apart) > kNear) {
+    out += "found for a tick " + format_number(std::abs(apart), 3) + " s " +
+           (apart > 0 ? "later, " : "earlier, ");
+  }
+  return out + count(modes.zero_modes, "zero mode") + "\n" +
+         table_of(loop_modes(modes), mode_fields());
 }
 
 std::vector<Field<RingDownMode>> ring_down_fields() {
@@ -238,7 +248,9 @@ std::string to_table(const RunReport& report) {
   out += timing_text(report) + statuses_text(loop) + extremes_text(report.extremes) +
          contact_text(report) + error_text(loop) + energy_text(report.energy) + fault_text(loop) +
          messages_text(report) + commands_text(report.commands, loop.commands_refused);
-  if (loop.first_modes.tick != 0) {
+  if (loop.first_modes.tick == 0) {
+    out += "  Modes: none, because the analysis is off or did not finish while the loop ran\n";
+  } else {
     out += solved_text(loop.first_modes, loop.last_modes);
     if (!report.friction_text.empty()) out += "\n  " + report.friction_text + "\n";
     if (!report.drives_text.empty()) out += "\n  " + report.drives_text + "\n";
@@ -247,10 +259,8 @@ std::string to_table(const RunReport& report) {
              ". Fast modes and gain\n  margins are those of " + report.without_rotors + ".\n  " +
              report.rotors_hint + "\n";
     }
-    out += "\nModes at the start, " + count(loop.first_modes.zero_modes, "zero mode") + "\n" +
-           modes_table(loop.first_modes);
-    out += "\nModes at the end, " + count(loop.last_modes.zero_modes, "zero mode") + "\n" +
-           modes_table(loop.last_modes);
+    out += modes_text("start", loop.first_modes, 1, report.period) +
+           modes_text("end", loop.last_modes, loop.ticks, report.period);
   }
   if (report.ring_down) {
     out += "\nRing-down after " + count(report.ring_down->releases, "small release") +
