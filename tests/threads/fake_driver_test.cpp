@@ -112,7 +112,7 @@ TEST_P(FakeDrivers, PutOutWhatWasCommanded) {
 
 TEST_P(FakeDrivers, HoldOrDampAnArmThatNobodyCommandsAnyMore) {
   const Arm arm = GetParam();
-  Commanded driver(arm, {});
+  Commanded driver(arm, {"--lock-step"});  // its clock is the simulation
   if (!driver.hear(320)) GTEST_SKIP() << kNoMulticast;
   JointVector torque = JointVector::Zero(7);
   torque[0] = 4;
