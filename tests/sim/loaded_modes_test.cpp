@@ -249,7 +249,7 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
     std::vector<testing::Recording> recordings;
     for (int k = 0; k < 3; ++k) recordings.push_back(arm.record(1e-7 * random.vector(n), 1600));
     ASSERT_EQ(arm.worst, controller::Status::kOk) << to_text(arm.worst);
-    const auto fit = testing::fit_modes(recordings, settings.period, arm.system.mass);
+    const auto fit = testing::fit_states(recordings, settings.period, arm.system.mass);
     ASSERT_EQ(fit.modes.size(), 6u);
 
     analysis::SampledLoop loop;
@@ -331,7 +331,7 @@ TEST_P(LoadedPostures, HaveTheModesOfTheSimulatedMotion) {
     std::vector<testing::Recording> recordings;
     for (int k = 0; k < 3; ++k) recordings.push_back(arm.record(1e-7 * random.vector(n), 4000));
     ASSERT_EQ(arm.worst, controller::Status::kOk) << to_text(arm.worst);
-    const auto fit = testing::fit_modes(recordings, settings.period, arm.system.mass);
+    const auto fit = testing::fit_states(recordings, settings.period, arm.system.mass);
     ASSERT_EQ(fit.modes.size(), 7u);
     analysis::SampledLoop loop;
     loop.period = settings.period;

@@ -48,9 +48,9 @@ std::vector<double> seen_ratios(const TwinModels& twin, const controller::Settin
     arm.emplace(twin, settings, q0, dq);
     recordings.push_back(arm->record(q0, 300));
   }
-  const auto fit = testing::fit_modes(recordings, settings.period, arm->closed_loop.mass);
+  const auto fit = testing::fit_states(recordings, settings.period, arm->closed_loop.mass);
   std::vector<double> ratios;
-  for (const testing::IdentifiedMode& mode : fit.modes) {
+  for (const testing::FittedMode& mode : fit.modes) {
     if (mode.natural_frequency > slowest) ratios.push_back(mode.damping_ratio);
   }
   return ratios;

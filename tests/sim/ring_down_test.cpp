@@ -62,7 +62,7 @@ struct ReleasedTwin {
       recordings.push_back(arm->record(q0, ticks, every, 40));
       ASSERT_EQ(arm->worst, controller::Status::kOk) << to_text(arm->worst);
     }
-    const auto fit = testing::fit_modes(recordings, every * loop.period, arm->closed_loop.mass);
+    const auto fit = testing::fit_states(recordings, every * loop.period, arm->closed_loop.mass);
     EXPECT_LT(fit.residual, 1e-3);
 
     const analysis::SampledSpectrum images =

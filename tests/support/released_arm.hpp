@@ -161,7 +161,7 @@ struct Worst {
 
   /// Compares the fitted mode next to `eigenvalue` with this frequency and ratio; both have to be
   /// within these differences.
-  void add(const testing::IdentifiedModes& fit, analysis::Complex eigenvalue, double omega,
+  void add(const testing::StateFit& fit, analysis::Complex eigenvalue, double omega,
            double zeta, double most_frequency, double most_ratio) {
     const auto& seen =
         *std::min_element(fit.modes.begin(), fit.modes.end(), [&](const auto& a, const auto& b) {
@@ -176,20 +176,12 @@ struct Worst {
     ++modes;
   }
   /// Compares with a mode of a sampled loop.
-  void add(const testing::IdentifiedModes& fit, const analysis::SampledMode& mode,
+  void add(const testing::StateFit& fit, const analysis::SampledMode& mode,
            double most_frequency, double most_ratio) {
     add(fit, mode.eigenvalues[0], mode.natural_frequency, mode.damping_ratio, most_frequency,
         most_ratio);
   }
 };
-
-inline testing::IdentifiedModes fit_modes(const std::vector<testing::Recording>& recordings,
-                                          double period, const Eigen::MatrixXd& mass) {
-  testing::IdentificationOptions options;
-  options.period = period;
-  options.mass = mass;
-  return identify_modes(recordings, options);
-}
 
 inline analysis::Spectrum<controller::kMaxJoints> spectrum_of(
     const analysis::System<controller::kMaxJoints>& system) {
