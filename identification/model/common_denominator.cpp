@@ -1,5 +1,5 @@
 #include <dashpot/identification/model/common_denominator.hpp>
-#include <dashpot/identification/records/motion_kind.hpp>
+#include <dashpot/identification/records/motion_spectrum.hpp>
 
 #include <unsupported/Eigen/FFT>
 

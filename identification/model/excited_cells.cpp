@@ -1,6 +1,6 @@
 #include <dashpot/identification/model/excited_cells.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
-#include <dashpot/identification/records/motion_kind.hpp>
+#include <dashpot/identification/records/motion_spectrum.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -8,16 +8,4 @@ namespace dashpot::identification {
 /// channels x samples, `step` (s) apart.
 double pace_of(const Eigen::MatrixXd& grid, double step, const Eigen::VectorXd& noise);
 
-/// Squares of the spectrum of a sequence's differences, from line 1: what begins and ends at
-/// different values leaks less. There are half as many lines as the transform has samples, less
-/// one.
-Eigen::VectorXd difference_power(const Eigen::VectorXd& samples);
-
-/// rad/s up to which some channel's motion stands out from its noise, by means of `lines` lines.
-double band_of_motion(const Eigen::MatrixXd& grid, double step, const Eigen::VectorXd& noise,
-                      Eigen::Index lines);
-
-/// Samples, at most `samples`, of which a fast Fourier transform is fast.
-Eigen::Index smooth_count(Eigen::Index samples);
-
 }  // namespace dashpot::identification

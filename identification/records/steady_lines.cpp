@@ -1,5 +1,5 @@
 #include <dashpot/identification/records/decay_cells.hpp>
-#include <dashpot/identification/records/motion_kind.hpp>
+#include <dashpot/identification/records/motion_spectrum.hpp>
 #include <dashpot/identification/records/steady_lines.hpp>
 
 #include <Eigen/Cholesky>

@@ -160,12 +160,12 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   const bool coloured = search.fit.whiteness > kFarFromWhite;
   const bool doubted = coloured && (search.data.inputs == 0 || 1 - result.explained > kMuch);
   for (MeasuredMode& mode : modes) {
-    const double rest = 1 - result.explained;
-    if (mode.stability > 0 && mode.energy < kOfRest * rest) {
+    const double unexplained = 1 - result.explained;
+    if (mode.stability > 0 && mode.energy < kOfRest * unexplained) {
       mode.reason = "much weaker than what is left over";
-    } else if (mode.stability == 0 && mode.energy < rest) {
+    } else if (mode.stability == 0 && mode.energy < unexplained) {
       mode.reason = "weaker than what is left over, and in no model of another order";
-    } else if (mode.stability == 0 && rest > kPoor) {
+    } else if (mode.stability == 0 && unexplained > kPoor) {
       mode.reason = "in no model of another order, and much is left over";
     }
     if (doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {

@@ -186,8 +186,10 @@ void judge(std::vector<MeasuredMode> modes, double duration, double step, Identi
     if (judged.reason.empty()) judged.reason = doubt(mode, modes, duration, step);
     (judged.reason.empty() ? result.modes : result.rejected).push_back(std::move(judged));
   }
-  // A model most of which is none makes up the rest of it, too, as for what friction leaves.
-  if (result.rejected.size() > result.modes.size()) {
+  // Where the rest is coloured, as by friction, and most of a model is rejected, the remaining
+  // modes only make up for it as well.
+  constexpr double kWhite = 1.5;
+  if (result.whiteness > kWhite && result.rejected.size() > result.modes.size()) {
     const auto alone = std::stable_partition(result.modes.begin(), result.modes.end(),
                                              [](const auto& mode) { return mode.stability > 0; });
     for (auto mode = alone; mode != result.modes.end(); ++mode) {
