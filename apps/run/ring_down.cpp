@@ -170,7 +170,10 @@ std::optional<RingDown> measure_ring_down(const Scene& scene,
   result.residual = std::sqrt(1 - fit.explained);
   std::vector<Row> rows = rows_of(rest->modes);
   if (scene.arm) add_sampled(scene, result, rows);
-  add_measured(fit.modes, rows);
+  // Without noise what is found is there, also where a record of an arm would leave it in doubt.
+  std::vector<identification::MeasuredMode> found = fit.modes;
+  found.insert(found.end(), fit.rejected.begin(), fit.rejected.end());
+  add_measured(found, rows);
   for (const Row& row : rows) result.modes.push_back(row.mode);
   return result;
 }
