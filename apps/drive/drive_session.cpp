@@ -184,11 +184,11 @@ bool DriveSession::take(const DriverStatus& status, std::int64_t arrived, std::i
 
 /// Tells of a fault, and of what is worse than it and comes later.
 void DriveSession::note_fault(std::int32_t code) {
-  const LoopRecord& record = journal_.record;
-  if (record.faults > faults_ || record.fault == DASHPOT_OK) told_ = DASHPOT_FAULT_LATCHED;
-  faults_ = record.faults;
-  if (record.fault == DASHPOT_OK) return;
-  const std::int32_t worst = std::max(code, record.fault);
+  const LoopRecord& loop = journal_.record;
+  if (loop.faults > faults_ || loop.fault == DASHPOT_OK) told_ = DASHPOT_FAULT_LATCHED;
+  faults_ = loop.faults;
+  if (loop.fault == DASHPOT_OK) return;
+  const std::int32_t worst = std::max(code, loop.fault);
   if (worst <= told_) return;
   told_ = worst;
   warning_ = "a fault has latched, the arm is damped: " +

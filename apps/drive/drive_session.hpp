@@ -123,7 +123,7 @@ class DriveSession {
   std::int64_t quiet_until_ = 0;  ///< utime of the first status to be answered again
   bool ending_ = false, ended_ = false;
   dashpot_modes modes_{};  ///< of the springs, before the end
-  std::int64_t fade_;  ///< us
+  std::int64_t fade_;      ///< us
   std::optional<std::int64_t> stopping_since_, fading_since_;
   std::int64_t seen_at_ = 0;        ///< while it stops: utime of seen_
   JointVector seen_;                ///< where it was then

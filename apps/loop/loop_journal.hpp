@@ -27,8 +27,8 @@ struct LoopRecord {
   std::int64_t fault_tick = 0;        ///< when it latched; 0: there is none
   dashpot_modes first_modes{};        ///< the first that were found; tick 0: none were
   dashpot_modes last_modes{};         ///< the last that were found
-  bool cartesian = false;  ///< Cartesian springs were in force
-  bool joint = false;      ///< joint springs were in force
+  bool cartesian = false;             ///< Cartesian springs were in force
+  bool joint = false;                 ///< joint springs were in force
   // The largest distances between where these springs are fixed and where the robot is:
   double tip_error = 0;        ///< m
   double tip_angle_error = 0;  ///< rad

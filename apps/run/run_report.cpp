@@ -38,14 +38,13 @@ std::string status_text(std::size_t status) {
   return controller::to_text(static_cast<controller::Status>(status));
 }
 
-/// The modes near `tick`, with their time where they belong to a much earlier or later one.
-std::string modes_text(const char* when, const dashpot_modes& modes, std::int64_t tick,
-                       double period) {
+/// The modes at a `time`, s, with their own time where that is much earlier or later.
+std::string modes_text(const char* when, const dashpot_modes& modes, double time) {
   constexpr double kNear = 0.1;  // s
-  const double apart = static_cast<double>(static_cast<std::int64_t>(modes.tick) - tick) * period;
+  const double apart = 1e-9 * static_cast<double>(modes.time) - time;
   std::string out = std::string("\nModes at the ") + when + ", ";
   if (std::abs(apart) > kNear) {
-    out += "found for a tick " + format_number(std::abs(apart), 3) + " s " +
+    out += "found " + format_number(std::abs(apart), 3) + " s " +
            (apart > 0 ? "later, " : "earlier, ");
   }
   return out + count(modes.zero_modes, "zero mode") + "\n" +
@@ -259,8 +258,8 @@ std::string to_table(const RunReport& report) {
              ". Fast modes and gain\n  margins are those of " + report.without_rotors + ".\n  " +
              report.rotors_hint + "\n";
     }
-    out += modes_text("start", loop.first_modes, 1, report.period) +
-           modes_text("end", loop.last_modes, loop.ticks, report.period);
+    out += modes_text("start", loop.first_modes, 0) +
+           modes_text("end", loop.last_modes, report.simulated_time);
   }
   if (report.ring_down) {
     out += "\nRing-down after " + count(report.ring_down->releases, "small release") +

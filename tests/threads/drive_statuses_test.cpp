@@ -160,9 +160,9 @@ TEST_P(DriveStatuses, TheTorqueFadesBeforeTheEnd) {
 
 TEST_P(DriveStatuses, AnArmThatNeedsItsBrakesEndsIt) {
   begin();
-  writer.next.velocity[0] = 1;
+  writer.next.velocity[0] = 1.5;
   for (int k = 0; k < 100; ++k) {  // the springs pull, and what damps ends as the motion does
-    writer.next.position[0] += 1e-3;
+    writer.next.position[0] += 1.5e-3;
     writer.step(100);
   }
   writer.frozen = true;

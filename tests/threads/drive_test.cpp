@@ -1,5 +1,6 @@
 // `dashpot drive` with `dashpot fake-driver`: what it answers, what it refuses, and what becomes of
 // a driver's troubles.
+#include <dashpot/controller/plugin.h>
 #include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/threads/drive_arms.hpp>
