@@ -161,8 +161,8 @@ struct Worst {
 
   /// Compares the fitted mode next to `eigenvalue` with this frequency and ratio; both have to be
   /// within these differences.
-  void add(const testing::StateFit& fit, analysis::Complex eigenvalue, double omega,
-           double zeta, double most_frequency, double most_ratio) {
+  void add(const testing::StateFit& fit, analysis::Complex eigenvalue, double omega, double zeta,
+           double most_frequency, double most_ratio) {
     const auto& seen =
         *std::min_element(fit.modes.begin(), fit.modes.end(), [&](const auto& a, const auto& b) {
           return std::abs(a.eigenvalues[0] - eigenvalue) < std::abs(b.eigenvalues[0] - eigenvalue);
@@ -176,8 +176,8 @@ struct Worst {
     ++modes;
   }
   /// Compares with a mode of a sampled loop.
-  void add(const testing::StateFit& fit, const analysis::SampledMode& mode,
-           double most_frequency, double most_ratio) {
+  void add(const testing::StateFit& fit, const analysis::SampledMode& mode, double most_frequency,
+           double most_ratio) {
     add(fit, mode.eigenvalues[0], mode.natural_frequency, mode.damping_ratio, most_frequency,
         most_ratio);
   }

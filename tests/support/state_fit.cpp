@@ -60,8 +60,7 @@ Roots find_roots(const std::vector<MatrixXd>& states, Index stride, double perio
     const bool still = x.head(n).norm() > x.tail(n).norm();
     const double error = (left.row(i) * left_over).norm() * per_S.cwiseProduct(right.col(i)).norm();
     found.roots.push_back({std::log(z) / (static_cast<double>(stride) * period),
-                           error / std::abs(z),
-                           (still ? x.head(n) : x.tail(n)).normalized()});
+                           error / std::abs(z), (still ? x.head(n) : x.tail(n)).normalized()});
   }
   return found;
 }
@@ -73,8 +72,7 @@ FittedMode mode_of(Complex first, Complex second) {
 
 }  // namespace
 
-StateFit fit_states(const std::vector<Recording>& recordings, double period,
-                    const MatrixXd& mass) {
+StateFit fit_states(const std::vector<Recording>& recordings, double period, const MatrixXd& mass) {
   const MatrixXd L_T = mass.llt().matrixU();
   double q_size = 0, v_size = 0;
   Index shortest = std::numeric_limits<Index>::max();
