@@ -54,7 +54,8 @@ typedef struct dashpot_controller dashpot_controller;
  *   hold: the springs stop where they are, whatever the set-point says; no commanded wrench.
  *   damp: there are no springs, only a brake, and the weight of the arm where the controller
  *         compensates it.
- *   ramp: the last good torque goes to zero within 0.1 s, or as fast as limits.torque_rate allows.
+ *   ramp: the last torque for watchdog.longest_gap; then the last known weight, and a brake by what
+ *         the model says of the last good state; after 2 s the torque goes to zero within 0.1 s.
  * Where damp and ramp take torque away, it fades evenly, in all joints alike.
  *
  * Faults latch. After any "damp" but DASHPOT_SETPOINT_LOST, after DASHPOT_STATE_FROZEN, and after a
@@ -404,9 +405,10 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
  * dashpot_set_gains does, and then resets as dashpot_reset does. `torque` (n, N m) is the torque
  * that the robot applies now; NULL stands for the arm's weight at `position` (zero where the robot
  * compensates it). Refuses a position beyond the limits of the URDF, as that of degrees is, and a
- * torque that contradicts the weight (`watchdog.start_torque`; none accepts it). Takes some milliseconds and allocates. Returns DASHPOT_OK or a negative code;
- * dashpot_last_error then says more. A loop without this call starts from the weight as well, but
- * with gains that were not judged at its posture. */
+ * torque that contradicts the weight (`watchdog.start_torque`; none accepts it). Takes some
+ * milliseconds and allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error then says
+ * more. A loop without this call starts from the weight as well, but with gains that were not
+ * judged at its posture. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 
 /* Forgets history, faults and set-point, but not the gains. Called on the real-time thread. The

@@ -6,9 +6,12 @@ namespace dashpot::controller {
 /// Result of one tick. If several conditions hold, the most severe, the last in this list, is
 /// returned. From kSetpointStale on each comes with a safe output:
 ///   hold:  the springs stop where they are, whatever the set-point says; no commanded wrench.
-///   damp:  no springs: the brake (see Brake), and the arm's weight where the controller
-///          compensates it.
-///   ramp:  the last good torque goes to zero within 0.1 s.
+///   damp:  no springs: the brake (see Brake), which holds the arm once it stands, and the arm's
+///          weight where the controller compensates it.
+///   ramp:  the last torque for Watchdog::longest_gap; then the last known weight, with a brake
+///   that
+///          goes by what the model says of the last good state; after 2 s the torque goes to zero
+///          within 0.1 s. Before the first good state it stays what it was for these 2 s.
 /// Torque and torque-rate limits hold for all of them. Where damp and ramp take torque away, it
 /// fades evenly: in all joints alike, as slowly as the slowest torque-rate limit makes it.
 ///

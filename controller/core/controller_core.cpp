@@ -1,3 +1,4 @@
+#include <dashpot/controller/base/joint_algebra.hpp>
 #include <dashpot/controller/core/controller_core.hpp>
 #include <dashpot/controller/core/gears_stop.hpp>
 #include <dashpot/controller/core/thresholds.hpp>
@@ -30,7 +31,8 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
 void ControllerCore::reset(const JointVector& torque) noexcept {
   state_check_.reset();
   faults_.reset();
-  if (torque.size() == n_ && torque.allFinite()) {
+  given_ = torque.size() == n_ && torque.allFinite();
+  if (given_) {
     filter_.reset(torque);
   } else {
     filter_.restart();
@@ -61,6 +63,7 @@ void ControllerCore::forget_springs() noexcept {
   course_.release();
   integral_.reset();
   filter_.brake().firm();
+  filter_.begin_anew();  // what was held fades evenly
   aim_ = Aim::kStop;
 }
 
@@ -90,8 +93,9 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     if (state.velocity.size() == n_ && state.velocity.allFinite()) {
       snapshot_.velocity = state.velocity;
     }
-    filter_.ramp(torque);
-    faults_.applied(input, sensed_, sensed_.any ? age : 0, torque);
+    const double lost = sensed_.any ? age : 0;
+    go_blind(std::max(lost, faults_.blind() + settings_.period), torque);
+    faults_.applied(input, sensed_, lost, torque);
     return finish(input, torque);
   }
   sensed_.dt = sensed_.any ? std::max(settings_.period, age) : settings_.period;
@@ -157,6 +161,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     if (!level_.kept && course_.gains().still()) status = worse(status, Status::kLittleMargin);
     if (given.task_weight > 0) factor = &null_space.mass();
   } else {
+    if (faults_.blind() > 0) filter_.begin_anew();
     brake();
     torque = sensed_.weight;
   }
@@ -181,6 +186,17 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   return finish(odd_stamp ? worse(status, input) : status, torque);
 }
 
+void ControllerCore::go_blind(double lost, JointVector& torque) noexcept {
+  if (lost > kWeightHeld || !(sensed_.any || given_)) return filter_.ramp(torque);
+  if (lost <= settings_.watchdog.longest_gap || !sensed_.any) return filter_.repeat(torque);
+  brake();
+  torque = sensed_.weight;
+  const bool floats = aim_ == Aim::kFloat;  // the velocity or the brake was doubted before
+  filter_.apply({sensed_.q, sensed_.qd, sensed_.robot, sensed_.weight, nullptr}, 0,
+                floats ? Aim::kFloat : Aim::kBlind, asked_.dampers, torque);
+  if (!floats) add(filter_.brake().slowing(), sensed_.qd, settings_.period);
+}
+
 void ControllerCore::restart_springs() noexcept {
   aim_ = Aim::kSprings;
   course_.restart(sensed_);
@@ -192,7 +208,7 @@ void ControllerCore::restart_springs() noexcept {
 }
 
 void ControllerCore::brake() noexcept {
-  if (aim_ == Aim::kSprings || faults_.ramps()) filter_.begin_anew();
+  if (aim_ == Aim::kSprings) filter_.begin_anew();
   aim_ = faults_.aim();
   integral_.reset();
   level_ = {};

@@ -37,6 +37,9 @@ class ControllerCore {
 
   /// Starts the springs where the robot is, with gains that grow from zero.
   void restart_springs() noexcept;
+  /// No state could be trusted for a time `lost`, s: the last torque, the brake by what the model
+  /// says with the last known weight, and at last a ramp.
+  void go_blind(double lost, JointVector& torque) noexcept;
   /// No springs act from now on.
   void brake() noexcept;
   /// Springs restart when they are next in force.
@@ -69,6 +72,7 @@ class ControllerCore {
   // What the last tick left:
   Sensed sensed_;
   Aim aim_ = Aim::kStop;
+  bool given_ = false;  ///< the torque that acted at the start
   LawTorque asked_;
   analysis::DampingLevel level_;  ///< of the ratios
   Impedance brake_;               ///< damping of the brake that acts where no springs do

@@ -10,13 +10,14 @@ void Faults::reset() noexcept {
   motion_watch_.reset();
   release();
   restarts_ = 0;
-  ramp_ticks_ = 0;
+  blind_ticks_ = 0;
 }
 
 Status Faults::watch(Status seen, const Sensed& now, bool still, Brake* brake) noexcept {
   restarts_ = std::max(0.0, restarts_ - now.dt);
   // A motion that nobody saw, or whose velocities are others now, has gained nothing.
-  const bool brakes = brake != nullptr && seen == Status::kOk;
+  const bool brakes =
+      brake != nullptr && seen == Status::kOk && now.dt <= settings_.watchdog.longest_gap;
   Status found = worse(seen, motion_watch_.check({now.dt, now.q, now.qd, now.robot,
                                                   now.external_wrench, still, brakes}));
   if (restarts_ > kMostRestarts) found = worse(found, Status::kTooManyRestarts);
@@ -32,11 +33,10 @@ Status Faults::watch(Status seen, const Sensed& now, bool still, Brake* brake) n
 
 void Faults::applied(Status status, const Sensed& now, double lost,
                      const JointVector& torque) noexcept {
-  const bool ramps = status >= Status::kStateNotFinite;
-  ramp_ticks_ = ramps ? ramp_ticks_ + 1 : 0;
-  if (ramps) rest_ = 0;
-  if (std::max(lost, ramp_ticks_ * settings_.period) > settings_.watchdog.longest_gap)
-    latch(status);
+  const bool blind = status >= Status::kStateNotFinite;
+  blind_ticks_ = blind ? blind_ticks_ + 1 : 0;
+  if (blind) rest_ = 0;
+  if (std::max(lost, this->blind()) > settings_.watchdog.longest_gap) latch(status);
   if (now.any) motion_watch_.applied(torque, now.weight);
 }
 

@@ -23,8 +23,8 @@ class Faults {
   /// `brake`: null unless it acts alone; it becomes softer if it shakes the arm. Returns kOk if the
   /// state allows springs, or kFaultLatched or worse.
   Status watch(Status seen, const Sensed& now, bool still, Brake* brake) noexcept;
-  /// The torque of a tick, and its status. A ramp latches if it lasts, or where there has been no
-  /// good state for a time `lost` that is too long, s.
+  /// The torque of a tick, and its status. Blindness latches if it lasts, or where there has been
+  /// no good state for a time `lost` that is too long, s.
   void applied(Status status, const Sensed& now, double lost, const JointVector& torque) noexcept;
   /// Springs restart, not for the first time.
   void count_restart() noexcept { ++restarts_; }
@@ -33,8 +33,8 @@ class Faults {
   Status fault() const noexcept { return fault_; }
   /// Returns what the arm is to do without springs.
   Aim aim() const noexcept;
-  /// True after a tick whose output was a ramp.
-  bool ramps() const noexcept { return ramp_ticks_ > 0; }
+  /// Returns for how long no state or law could be trusted, up to the last tick, s.
+  double blind() const noexcept { return blind_ticks_ * settings_.period; }
   double tip_speed() const noexcept { return motion_watch_.tip_speed(); }
   void limit_tip_speed(double limit) noexcept { motion_watch_.limit_tip_speed(limit); }
 
@@ -50,7 +50,7 @@ class Faults {
   Status fault_ = Status::kOk;
   double rest_ = 0;      ///< for how long the robot has been at rest, s
   double restarts_ = 0;  ///< of the last second or so
-  int ramp_ticks_ = 0;
+  int blind_ticks_ = 0;
 };
 
 }  // namespace dashpot::controller

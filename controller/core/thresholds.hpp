@@ -5,6 +5,9 @@ namespace dashpot::controller {
 
 /// Springs that restart more often than this within about a second hunt a fault that comes back.
 inline constexpr double kMostRestarts = 3;
+/// Where no state can be trusted, the last known weight is held for so long, s: robots engage their
+/// brakes within a few tenths of that. Later nobody knows whether it holds the arm or drives it.
+inline constexpr double kWeightHeld = 2;
 /// A joint rests below this share of its velocity limit: sensors that are noisy stay below it.
 inline constexpr double kAtRest = 0.01;
 /// With a lower TipSpeed::limit references keep to this share of it, because SafetyFilter takes

@@ -14,23 +14,31 @@ constexpr double kNearMargin = 3;      // likewise at the edge of an interval
 constexpr double kNear = 0.2;          // t / T: short, so that the law keeps its say
 constexpr double kFullVelocity = 0.9;  // of a velocity limit: the rest is for what nobody expects
 constexpr double kSlowly = 0.5;  // of a velocity limit: what is slower may be pressing on something
-constexpr double kBraking = 0.5;       // of the torque that is left: the rest is for other joints
-constexpr double kLeastBraking = 0.1;  // of a torque limit, whatever the weight
-constexpr double kReturn = 0.025;      // of a velocity limit
-constexpr double kFastestStop = 1000;  // velocity limits: no robot, and sums stay finite
-constexpr double kMarginShare = 0.02;  // of the way between two position limits
-constexpr double kFell = 0.5;          // of the kinetic energy: the brake has acted,
-constexpr double kRose = 0.1;          // and drives the arm back
-constexpr double kSlowAlready = 0.1;   // of velocity limits: no brake has to be softer
-constexpr double kSoftest = 8;         // times T
-constexpr double kMemory = 0.5;        // s, ten times as long as the brake needs
-constexpr double kPushed = 0.5;        // of velocity limits: somebody pushes the arm
-constexpr double kPushedLeast = 1;     // rad/s, or m/s: as fast as a hand pushes, be the limit low
-constexpr double kRounding = 1e-9;     // N m or rad/s^2, in coordinates in which the mass is 1
-constexpr double kSoft = 1e-7;         // of a bound of acceleration, beside one of torque
-constexpr double kMarginMost = 0.02;   // rad, m
-constexpr double kNearby = 0.02;       // rad (m), or of the inertia: M^-1 is about the same
-constexpr double kAbout = 1.5;         // times an acceleration that is known about
+constexpr double kBraking = 0.5;        // of the torque that is left: the rest is for other joints
+constexpr double kLeastBraking = 0.1;   // of a torque limit, whatever the weight
+constexpr double kReturn = 0.025;       // of a velocity limit
+constexpr double kFastestStop = 1000;   // velocity limits: no robot, and sums stay finite
+constexpr double kMarginShare = 0.02;   // of the way between two position limits
+constexpr double kFell = 0.5;           // of the kinetic energy: the brake has acted,
+constexpr double kRose = 0.1;           // and drives the arm back
+constexpr double kSlowAlready = 0.1;    // of velocity limits: no brake has to be softer
+constexpr double kSoftest = 8;          // times T
+constexpr double kMemory = 0.5;         // s, ten times as long as the brake needs
+constexpr double kPushed = 0.5;         // of velocity limits: somebody pushes the arm
+constexpr double kPushedLeast = 1;      // rad/s, or m/s: as fast as a hand pushes, be the limit low
+constexpr double kStiff = 1.0 / 3;      // T_h / T
+constexpr double kStiffness = 2.0 / 9;  // times 1 / T_h^2: rates 1 / 3 T_h and 2 / 3 T_h
+constexpr double kSmooth = 0.1;         // of T: time constant of velocities
+constexpr double kStands = 0.03;        // of a velocity limit
+constexpr double kSlows = 2;            // s: what slows down more slowly is driven
+constexpr double kFades = 0.5;          // s: resistance that nobody sees
+constexpr double kAllTorque = 0.999;    // of a torque limit
+constexpr double kResists = 0.5;        // of a torque limit
+constexpr double kRounding = 1e-9;      // N m or rad/s^2, in coordinates in which the mass is 1
+constexpr double kSoft = 1e-7;          // of a bound of acceleration, beside one of torque
+constexpr double kMarginMost = 0.02;    // rad, m
+constexpr double kNearby = 0.02;        // rad (m), or of the inertia: M^-1 is about the same
+constexpr double kAbout = 1.5;          // times an acceleration that is known about
 
 /// The velocity with which a joint may move toward a limit at a distance.
 double before(double distance, double braking, double reaction) noexcept {
@@ -56,6 +64,8 @@ Brake::Brake(const Settings& settings, double gears) noexcept : n_(settings.limi
   stopping_time_ = std::max(limits.stopping_time, least);
   period_ = settings.period;
   near_ = std::max({kNear * limits.stopping_time, kNearMargin / kMargin * least, gears});
+  stiff_ = gears > 0 ? std::max(stopping_time_, gears) : kStiff * stopping_time_;
+  lag_ = lag;
   known_.q = JointVector::Constant(n_, std::numeric_limits<double>::infinity());
   for (Eigen::Index i = 0; i < n_; ++i) {
     Bounds& bounds = joints_[static_cast<std::size_t>(i)];
@@ -73,37 +83,93 @@ Brake::Brake(const Settings& settings, double gears) noexcept : n_(settings.limi
   firm();
 }
 
-JointVector Brake::stop(const Motion& motion, double inward) const noexcept {
-  JointVector change(n_), torque = JointVector::Zero(n_);
+double Brake::fastest(const JointVector& momentum) const noexcept {
+  double rate = 1 / lag_;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    const Bounds& bounds = joint(i);
-    const double q = motion.q[i], most = kFastestStop * bounds.velocity;
-    double wanted = 0;
-    if (q > bounds.upper + bounds.outermost) wanted = -kReturn * inward * bounds.velocity;
-    if (q < bounds.lower - bounds.outermost) wanted = kReturn * inward * bounds.velocity;
-    change[i] = wanted - std::clamp(motion.qd[i], -most, most);
+    const double letting_go = 4 * std::abs(momentum[i]) * joint(i).per_rate;  // s^2
+    rate = std::min(rate, 2 / (lag_ + std::sqrt(lag_ * lag_ + letting_go)));
   }
-  add_product(motion.robot.M, change, torque, 1 / stopping_time());
+  return rate;
+}
+
+JointVector Brake::stop(const Motion& motion, double inward, Resistance resistance) noexcept {
+  JointVector wanted = JointVector::Zero(n_), change(n_), momentum = wanted, torque = wanted;
+  const double share = seen_ ? std::min(1.0, period_ / (kSmooth * stopping_time())) : 1;
+  if (!seen_) v_ = JointVector::Zero(n_);
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    Bounds& bounds = joint(i);
+    const double q = motion.q[i], most = kFastestStop * bounds.velocity;
+    if (q > bounds.upper + bounds.outermost) wanted[i] = -kReturn * inward * bounds.velocity;
+    if (q < bounds.lower - bounds.outermost) wanted[i] = kReturn * inward * bounds.velocity;
+    const double v = std::clamp(motion.qd[i], -most, most);
+    v_[i] += share * (v - v_[i]);
+    bounds.growth = 0;
+    change[i] = wanted[i] - (stands_ ? v_[i] : v);
+  }
+  add_product(motion.robot.M, change, momentum);
+  const double fastest = this->fastest(momentum);
+  const double damping = std::min(fastest, 1 / (softness_ * stiff_));
+  if (resistance == Resistance::kGrows) {
+    resist(motion, wanted, kStiffness * damping * damping);
+  } else {
+    seen_ = false;
+  }
+  const double left = resistance == Resistance::kFades ? 1 - period_ / kFades : 1;
+  for (Eigen::Index i = 0; i < n_; ++i) torque[i] = joint(i).resistance *= left;
+  add(momentum, torque, stands_ ? damping : std::min(fastest, 1 / stopping_time()));
   return torque;
+}
+
+void Brake::resist(const Motion& motion, const JointVector& wanted, double stiffness) noexcept {
+  JointVector way = JointVector::Zero(n_), growth = way;
+  bool slow = true;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    Bounds& bounds = joint(i);
+    const double v = std::abs(v_[i] - wanted[i]);
+    bounds.slowest = seen_ ? std::min(v, (1 - period_ / kSlows) * bounds.slowest) : v;
+    // It is slow already, or what moves it is stronger than the brake.
+    const double least = kStands * bounds.velocity;
+    slow &= v <= least || v - bounds.slowest > least;
+    const double moved = seen_ ? motion.q[i] - q_[i] : 0;
+    if (wanted[i] * moved <= 0) way[i] = moved;  // on its way back nothing presses but the brake
+  }
+  stands_ |= slow;
+  add_product(motion.robot.M, way, growth, -stiffness);
+  for (Eigen::Index i = 0; i < n_ && stands_; ++i) {
+    Bounds& bounds = joint(i);
+    const double most = kResists * bounds.torque, before = bounds.resistance;
+    bounds.resistance = std::clamp(before + growth[i], -most, most);
+    bounds.growth = bounds.resistance - before;
+  }
+  q_ = motion.q;
+  seen_ = true;
+}
+
+void Brake::limited(const Motion& motion, const JointVector& excess) noexcept {
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const bool full = std::abs(excess[i] + held_weight(motion, i)) > kAllTorque * joint(i).torque;
+    if (full && excess[i] * joint(i).growth > 0) joint(i).resistance -= joint(i).growth;
+  }
 }
 
 void Brake::watch(const Motion& motion) noexcept {
   JointVector momentum = JointVector::Zero(n_);
-  add_product(motion.robot.M, motion.qd, momentum);
-  const double energy = 0.5 * product(momentum, motion.qd);
+  const JointVector& qd = seen_ ? v_ : motion.qd;
+  add_product(motion.robot.M, qd, momentum);
+  const double energy = 0.5 * product(momentum, qd);
   double slow = 0, pushed = 0, power = 0;
   for (Eigen::Index i = 0; i < n_; ++i) {
     const double M = motion.robot.M(i, i), v = joint(i).velocity;
     slow += 0.5 * M * std::pow(kSlowAlready * v, 2);
     pushed += 0.5 * M * std::pow(std::max(kPushed * v, kPushedLeast), 2);
-    power += std::abs(motion.robot.gravity[i] * motion.qd[i]);
+    power += (std::abs(motion.robot.gravity[i]) + std::abs(joint(i).resistance)) * std::abs(qd[i]);
   }
   most_ = std::max(most_, energy);
   if (energy < least_) least_ = energy, given_ = 0;
   given_ = given_ * (1 - period_ / kMemory) + power * period_;
   fell_ |= energy <= kFell * most_;
   const bool driven_back = fell_ && energy > least_ + kRose * most_ + slow;
-  if (driven_back && soften()) {
+  if (driven_back && !stands_ && soften()) {  // a spring that holds gives back what pushed it
     least_ = energy;
     given_ = 0;
   }
@@ -112,20 +178,28 @@ void Brake::watch(const Motion& motion) noexcept {
 
 bool Brake::soften() noexcept {
   const bool can = 2 * softness_ <= kSoftest * (1 + 1e-9);
-  if (can) softness_ *= 2;
-  return can;
+  if (!can) return false;
+  softness_ *= 2;
+  for (Eigen::Index i = 0; i < n_; ++i) joint(i).resistance /= 4;  // as its stiffness
+  return true;
 }
 
 void Brake::firm() noexcept {
   softness_ = 1;
   feeds_ = false;
   forget();
+  let_go();
+}
+
+void Brake::let_go() noexcept {
+  for (Eigen::Index i = 0; i < n_; ++i) joint(i).resistance = 0;
+  stands_ = false;
 }
 
 void Brake::forget() noexcept {
   most_ = given_ = 0;
   least_ = std::numeric_limits<double>::infinity();
-  fell_ = false;
+  fell_ = seen_ = false;
 }
 
 void Brake::factor(const Motion& motion) noexcept {
@@ -288,8 +362,16 @@ Status Brake::constrain(const Motion& motion, const JointVector& last, bool stop
     }
     for (Eigen::Index i = 0; i < n_; ++i) excess[i] = share * wanted[i];
     clip(motion, last, excess);
-    return Status::kTorqueLimited;
+    accelerate(now = excess);
+    status = Status::kTorqueLimited;
   }
+  if (stops) {
+    known_.torque = slowing_ = excess;
+    known_.acceleration = now;
+    for (Eigen::Index i = 0; i < n_; ++i) slowing_[i] -= joint(i).resistance;
+    accelerate(slowing_);
+  }
+  if (!solved) return status;
   for (Eigen::Index k = 0; k < count_; ++k) {
     status =
         worse(status, held(k).bound.at_limit ? Status::kNearJointLimit : Status::kTorqueLimited);

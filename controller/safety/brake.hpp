@@ -23,14 +23,33 @@ double loop_lag(const Settings& settings) noexcept;
 /// that bend it is refused where they do not bear it (see gears_stopping_time).
 ///
 /// `stop` wants the velocity zero, or the return velocity v_r outside a position limit:
-///     x = M (v_wanted - qd) / T.
+///     x = c M (v_wanted - qd),   c = min(1 / T, min_i 2 / (lag + sqrt(lag^2 + 2 |p_i| / R_i))),
+/// with the momentum p = M (v_wanted - qd) and the torque-rate limit R. A torque t that goes to
+/// zero at the rate R takes t^2 / (2 R) more of the momentum, and t lag meanwhile; the second bound
+/// is the c from which the brake can let go before any of p is used up. So a slow torque rate makes
+/// a stop longer, and drives no arm back.
+///
+/// Once the arm stands, `stop` holds it. It stands if each joint is slower than 3 % of its velocity
+/// limit, or gets faster than it was by that much. From then on, with T_h = T / 3 (with elastic
+/// gears T, or what they tolerate) and v the velocity smoothed over T / 10,
+///     x = c_h M (v_wanted - v) + r,   r <- r - (2/9) c_h^2 M (q - last q),
+/// c_h being c with T_h for T. So r is a spring M 2 / (9 T_h^2) about where the arm stood, which
+/// never drifts because differences of positions add up; with c_h = 1 / T_h all motion decays with
+/// 3 T_h and 3/2 T_h. An unknown torque e moves the arm by (9/2) T_h^2 M^-1 e. r is bounded to half
+/// of the torque limit in each joint: whoever pushes harder moves the arm, the place that is held
+/// goes along, and when let go the arm springs back by what r deflects. r does not grow where a
+/// torque limit is reached. It waits while the springs' torque fades, and fades with a time
+/// constant of half a second where nobody sees the motion. A joint on its way back from outside a
+/// limit adds to r only where it moves outward. A larger inertia than the model's makes the hold
+/// softer and less damped; no smaller gain makes it unstable, so it needs no second integral.
 ///
 /// A brake whose velocities are late, or whose model is wrong, may drive the arm back or shake it.
 /// `watch` softens it: where the kinetic energy fell by half and rises again by a tenth of what it
-/// was, T is doubled, up to eight times, until springs act again. And it doubts it: the energy
-/// may exceed the least, since the stop began or was softened, by what the weight can have given,
-/// int |w_i qd_i| dt over about half a second, as if all of it were held wrongly, and by that of
-/// joints with half of their velocity limits (at least 1 rad/s), each by itself: somebody may push.
+/// was, before the arm stands, T is doubled, up to eight times, until springs act again. And it
+/// doubts it: the energy may exceed the least, since the stop began or was softened, by what the
+/// weight can have given, int (|w_i| + |r_i|) |qd_i| dt over about half a second, as if all of it
+/// were held wrongly, and by that of joints with half of their velocity limits (at least 1 rad/s),
+/// each by itself: somebody may push.
 ///
 /// `constrain` finds the torque x' in excess of the weight w next to a torque x that is wanted, in
 /// the sense of Gauss's principle of least constraint,
@@ -72,14 +91,24 @@ class Brake {
     const SmallCholesky* mass;  ///< factor of robot.M, if anybody has it already; or null
   };
 
+  /// What becomes of the resistance in a tick.
+  enum class Resistance : std::uint8_t {
+    kWaits,  ///< stays as it is
+    kGrows,  ///< with what moves a joint that stands
+    kFades,  ///< because nobody sees what it does
+  };
   /// Returns x, n, N m. `inward` scales the velocity of joints outside their position limits back
   /// to them, 0 to 1.
-  JointVector stop(const Motion& motion, double inward) const noexcept;
+  JointVector stop(const Motion& motion, double inward,
+                   Resistance resistance = Resistance::kWaits) noexcept;
   /// Sets `excess` x to x', `last` being the torque of the last tick, n, N m; `stops` if it is one
   /// of `stop`. Returns kOk, kTorqueLimited, or kNearJointLimit.
   Status constrain(const Motion& motion, const JointVector& last, bool stops,
                    JointVector& excess) noexcept;
 
+  /// Takes note of x' = `excess` of the last `stop`: where it has all of a torque limit, r does not
+  /// grow.
+  void limited(const Motion& motion, const JointVector& excess) noexcept;
   /// Takes note of a motion in which a stop acts alone.
   void watch(const Motion& motion) noexcept;
   /// True if a stop has not stopped the arm, since springs last acted.
@@ -90,6 +119,11 @@ class Brake {
   void firm() noexcept;
   /// The motion is not the one that was watched: nobody saw it for a while.
   void forget() noexcept;
+  /// Nothing is held any more.
+  void let_go() noexcept;
+  /// Returns M^-1 (x' - r) of the last stop, rad/s^2: how the model slows down, r holding what the
+  /// model does not know.
+  const JointVector& slowing() const noexcept { return slowing_; }
   /// Returns T as it is now, s.
   double stopping_time() const noexcept { return softness_ * stopping_time_; }
 
@@ -104,6 +138,10 @@ class Brake {
     double torque_step;   ///< limit of its change in a tick, N m
     double reaction;      ///< r, s
     double per_rate;      ///< 1 / (2 torque_rate), s/(N m)
+
+    double slowest = 0;     ///< least speed lately, rad/s
+    double resistance = 0;  ///< r, N m
+    double growth = 0;      ///< of r in this tick, N m
   };
   /// What a joint may have in one direction.
   struct Bound {
@@ -127,6 +165,12 @@ class Brake {
     return joints_[static_cast<std::size_t>(i)];
   }
   Held& held(Eigen::Index k) noexcept { return held_[static_cast<std::size_t>(k)]; }
+  Bounds& joint(Eigen::Index i) noexcept { return joints_[static_cast<std::size_t>(i)]; }
+  /// Returns the greatest c of a brake c M v, 1/s, whose torque can be let go again before the
+  /// `momentum` M v is used up.
+  double fastest(const JointVector& momentum) const noexcept;
+  /// Sets what stands, and moves r on.
+  void resist(const Motion& motion, const JointVector& wanted, double stiffness) noexcept;
   /// Sets the factor of M for this tick.
   void factor(const Motion& motion) noexcept;
   double distance(const Motion& motion, Eigen::Index i, double way) const noexcept;
@@ -166,6 +210,8 @@ class Brake {
   Eigen::Index n_;
   double stopping_time_;  ///< T
   double near_;           ///< t
+  double stiff_;          ///< T_h
+  double lag_;
   double period_;
   double softness_ = 1;  ///< of this stop: what its T is multiplied by
   double most_ = 0;      ///< kinetic energy in this stop, J
@@ -173,6 +219,10 @@ class Brake {
   double given_ = 0;                                        ///< by the weight, J
   bool fell_ = false;
   bool feeds_ = false;
+  bool stands_ = false;  ///< so that what moves the arm is resisted
+  bool seen_ = false;    ///< q_ is that of the tick before
+  JointVector q_, v_;    ///< v: qd, smoothed
+  JointVector slowing_;
   Known known_;
   SmallCholesky own_mass_;
   const SmallCholesky* mass_ = nullptr;  ///< of this tick

@@ -45,24 +45,37 @@ void SafetyFilter::reset(const JointVector& torque) noexcept {
 void SafetyFilter::restart() noexcept {
   ramping_ = false;
   returning_ = 0;
+  stopping_ = 0;
   begin_anew();
 }
 
 Status SafetyFilter::apply(const Brake::Motion& motion, double tip_speed, Aim aim,
                            const JointVector& dampers, JointVector& tau) noexcept {
   const bool springs = aim == Aim::kSprings;
+  if (springs && !finite(tau) && finite(motion.weight)) {
+    begin_anew();
+    apply(motion, tip_speed, Aim::kBlind, dampers, tau);
+    begin_anew();
+    return Status::kNotFinite;
+  }
   JointVector excess(n_), brake = JointVector::Zero(n_);
   if (springs) brake_.firm();
   stopping_ = springs ? 0 : stopping_ + 1;
-  const bool alone = !fades() || stopping_ > longest_fade_;
-  if (aim != Aim::kFloat && !springs && alone) brake_.watch(motion);
+  const bool seen = aim == Aim::kStop || aim == Aim::kReturn;
+  const bool alone = seen && (!fades() || stopping_ > longest_fade_);
+  if (alone) brake_.watch(motion);
+  if (aim == Aim::kFloat) brake_.forget(), brake_.let_go();
   returning_ = aim == Aim::kReturn ? std::min(1.0, returning_ + return_step_) : 0;
   if (springs) {
     asked_ = tau;
     excess = difference(tau, motion.weight);
   } else {
     excess.setZero();
-    if (aim != Aim::kFloat) brake = brake_.stop(motion, returning_);
+    using Resistance = Brake::Resistance;
+    const Resistance resistance = alone  ? Resistance::kGrows
+                                  : seen ? Resistance::kWaits
+                                         : Resistance::kFades;
+    if (aim != Aim::kFloat) brake = brake_.stop(motion, returning_, resistance);
     asked_ = motion.weight;
     add(brake, asked_);
   }
@@ -87,7 +100,10 @@ Status SafetyFilter::apply(const Brake::Motion& motion, double tip_speed, Aim ai
   }
   if (fading_) limited |= fade(motion.qd, springs, base, excess);
   if (!springs) add(brake, excess);
-  if (aim != Aim::kFloat) status = worse(status, brake_.constrain(motion, last_, !springs, excess));
+  if (aim != Aim::kFloat) {
+    status = worse(status, brake_.constrain(motion, last_, !springs, excess));
+    if (!springs) brake_.limited(motion, excess);
+  }
   for (Eigen::Index i = 0; i < n_; ++i) tau[i] = weight[i] + excess[i];
   if (!finite(tau)) {
     ramp(tau);
@@ -143,7 +159,7 @@ bool SafetyFilter::share_out(const JointVector& base, const JointVector& dampers
 }
 
 void SafetyFilter::ramp(JointVector& tau) noexcept {
-  known_ = true;  // what it puts out is what acts
+  known_ = true;
   if (!ramping_) {
     double share = ramp_share_;
     for (Eigen::Index i = 0; i < n_; ++i) {

@@ -32,6 +32,7 @@ class SafetyFilter {
     kSprings,  ///< what the law says
     kStop,     ///< stop
     kReturn,   ///< stop, but joints outside their position limits come back
+    kBlind,    ///< stop, by what the model says: nobody sees the motion
     kFloat,    ///< nothing: the weight alone
   };
 
@@ -54,10 +55,15 @@ class SafetyFilter {
 
   /// Makes the law's torque safe, in place; `dampers` is the part of it that damps, `tip_speed` in
   /// m/s. Returns kOk, kTorqueLimited, kNearJointLimit, kWeightNotHeld, or kNotFinite, and then
-  /// sets what `ramp` gives.
+  /// stops, or sets what `ramp` gives if the weight is not finite either.
   Status apply(const Brake::Motion& motion, double tip_speed, Aim aim, const JointVector& dampers,
                JointVector& tau) noexcept;
 
+  /// Sets the last torque again.
+  void repeat(JointVector& tau) noexcept {
+    known_ = true;  // what it puts out is what acts
+    tau = last_;
+  }
   /// Where nothing is known: the last torque goes evenly to zero within 0.1 s, or as fast as the
   /// rate limits allow.
   void ramp(JointVector& tau) noexcept;

@@ -281,7 +281,7 @@ TEST_F(Safety, TooFastDampsUntilReleased) {
   EXPECT_NE(move(limit), Status::kVelocityLimit);
   EXPECT_EQ(move(1.001 * limit), Status::kVelocityLimit);
   EXPECT_EQ(snapshot().fault, Status::kVelocityLimit);
-  for (int k = 0; k < 200; ++k) move(1.001 * limit);
+  for (int k = 0; k < 50; ++k) move(1.001 * limit);  // what goes on for longer is held against
   const auto there = evaluate(model, arm->state.position, arm->state.velocity);
   const JointVector braked = gravity() - there.M * arm->state.velocity / 0.05;
   EXPECT_TRUE(near(arm->torque, braked, 1e-9));
@@ -292,7 +292,7 @@ TEST_F(Safety, TooFastDampsUntilReleased) {
   EXPECT_EQ(snapshot().restarts, 2u);
 }
 
-TEST_F(Safety, ALawThatOverflowsRampsDown) {
+TEST_F(Safety, ALawThatOverflowsDropsNothing) {
   settings.initial.gains.joint_damping.setIdentity(7, 7);
   settings.limits.velocity.setConstant(1e308);
   settings.limits.tip_velocity = 1e308;
@@ -302,7 +302,8 @@ TEST_F(Safety, ALawThatOverflowsRampsDown) {
   const JointVector before = arm->torque;
   arm->state.velocity[0] = 1e200;  // Coriolis torque overflows
   EXPECT_EQ(next(), Status::kNotFinite);
-  EXPECT_TRUE(near(arm->torque, 0.99 * before, 1e-9));
+  const double step = settings.limits.torque_rate[0] * settings.period;  // of the brake
+  EXPECT_TRUE(near(arm->torque, before, step + 1e-9));
   arm->state.velocity[0] = 0;
   EXPECT_EQ(next(), Status::kOk);
 }

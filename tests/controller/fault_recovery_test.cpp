@@ -29,7 +29,7 @@ class Recovery : public testing::Safety {
   }
 };
 
-/// What the bad states ramped to is what acts, although there has been no torque before.
+/// What the bad states left is what acts, although there has been no torque before.
 TEST_F(Recovery, StartsFromZeroAfterBadStates) {
   arm->controller = Controller(model, settings);
   EXPECT_EQ(bad(), Status::kStateNotFinite);
@@ -72,14 +72,14 @@ TEST_F(Recovery, GoesOnBetweenShortOutages) {
   EXPECT_EQ(snapshot().restarts, 1u);
 }
 
-/// While an arm is damped its torque comes back after a ramp in all joints alike.
+/// While an arm is stopped its torque comes back after a ramp in all joints alike.
 TEST_F(Recovery, FadesEvenlyAfterARamp) {
   run(1.0);
   pause();
   for (int k = 0; k < 100; ++k) next();
   ASSERT_TRUE(near(arm->torque, gravity(), 1e-6));
   const JointVector weight = gravity();
-  for (int k = 0; k < 60; ++k) bad();
+  for (int k = 0; k < 2060; ++k) bad();
   ASSERT_TRUE(near(arm->torque, 0.4 * weight, 1e-6));
   const double ticks = 0.6 * weight.cwiseAbs().maxCoeff();  // of 1 N m each
   ASSERT_GT(ticks, 5);
@@ -89,7 +89,7 @@ TEST_F(Recovery, FadesEvenlyAfterARamp) {
   }
   // And another ramp takes as long as the first.
   for (int k = 0; k < 30; ++k) next();
-  for (int k = 0; k < 50; ++k) bad();
+  for (int k = 0; k < 2050; ++k) bad();
   EXPECT_TRUE(near(arm->torque, 0.5 * weight, 1e-6));
 }
 
@@ -206,17 +206,6 @@ TEST_F(Recovery, AForceThatIsNoNumberIsACollisionWhereForcesAreWatched) {
     EXPECT_EQ(snapshot().joint_weight, watched ? 0 : 1);
     arm->state.external_wrench.setZero();
     EXPECT_EQ(next(), watched ? Status::kFaultLatched : Status::kOk);
-  }
-}
-
-/// Held by something else while the torque ramps down and its mean is 4.5 % less than the weight.
-TEST_F(Recovery, EstimatesACollisionWithTheTorqueOfARamp) {
-  for (const double share : {0.04, 0.05}) {
-    settings.limits.external_torque.setConstant(share * gravity().cwiseAbs().maxCoeff());
-    make();
-    run(1.0);
-    for (int k = 0; k < 9; ++k) EXPECT_EQ(bad(), Status::kStateNotFinite);
-    EXPECT_EQ(next() == Status::kCollision, share < 0.045) << share;
   }
 }
 

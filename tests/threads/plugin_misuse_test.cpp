@@ -128,11 +128,13 @@ TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
   EXPECT_STREQ(plugin().last_error(), "nothing to read so far");
 }
 
-/// A wrong state is no refusal: torque ramps down to zero, and the controller recovers.
+/// A wrong state is no refusal: the weight is held for 2 s, torque ramps down to zero, and the
+/// controller recovers.
 TEST(Plugin, IsSafeWithoutAState) {
   Host host = panda_host("watchdog: {feedback: 0}\n");  // the arm stays where it is
   for (int tick = 0; tick < 200; ++tick) ASSERT_EQ(host.tick(), DASHPOT_OK);
-  ASSERT_GT(joint_vector(host.torque).norm(), 1);
+  const VectorXd weight = joint_vector(host.torque);
+  ASSERT_GT(weight.norm(), 1);
   dashpot_state wrong_size = host.state();
   wrong_size.struct_size = 8;
   dashpot_state wrong_joints = host.state();
@@ -142,10 +144,13 @@ TEST(Plugin, IsSafeWithoutAState) {
   const std::array<const dashpot_state*, 4> states = {nullptr, &wrong_size, &wrong_joints,
                                                       &no_position};
   dashpot_output output = host.output();
-  for (std::size_t tick = 0; tick < 120; ++tick) {
+  for (std::size_t tick = 0; tick < 2150; ++tick) {
     ASSERT_EQ(plugin().update(host.controller.get(), states[tick % 4], nullptr, &output),
               DASHPOT_STATE_WRONG_SIZE);
     host.time += 1'000'000;
+    if (tick < 1990) {
+      ASSERT_LT((joint_vector(host.torque) - weight).norm(), 0.2) << tick;
+    }
   }
   EXPECT_EQ(joint_vector(host.torque), VectorXd::Zero(7));
   EXPECT_EQ(host.snapshot().status, DASHPOT_STATE_WRONG_SIZE);
