@@ -56,7 +56,10 @@ ModeNumbers mode_numbers(const Root& first, const Root& second, const Invariants
     std::swap(mode.eigenvalues[0], mode.eigenvalues[1]);
     std::swap(mode.eigenvalue_bounds[0], mode.eigenvalue_bounds[1]);
   }
-  if (!(v.product > 0)) {
+  // Of a pair whose slower eigenvalue may as well be zero no frequency is known.
+  const bool rigid = real && modulus(mode.eigenvalues[0]) <= mode.eigenvalue_bounds[0] &&
+                     std::isfinite(mode.error_bound);
+  if (!(v.product > 0) || rigid) {
     mode.natural_frequency = mode.damping_ratio = std::numeric_limits<double>::quiet_NaN();
   } else {
     const double omega = std::sqrt(v.product);
