@@ -61,9 +61,17 @@ void TaskInertia::compute(const Matrix6& A, const TipImpedance& base, const TipI
   regularity_ = 1 / trace;
   if (nearly_singular()) {
     const double deficit = 1 - regularity_ / kNearlySingular;
+    regular_.noalias() = X * X.transpose();
+    D_ = D;
+    H_.setIdentity();
+    if (!all_selected) {
+      H_.topLeftCorner<3, 3>() = H_linear;
+      H_.bottomRightCorner<3, 3>() = H_angular;
+    }
     G.diagonal() += kNearlySingular * deficit * deficit * D;
     factor_.compute(G, least_pivot);
     X = inverse_transpose(factor_);
+    selected_.noalias() = X * (X.transpose() * H_);
   }
   if (all_selected) {
     inertia_.noalias() = X * X.transpose();
@@ -73,6 +81,20 @@ void TaskInertia::compute(const Matrix6& A, const TipImpedance& base, const TipI
   LH.leftCols<3>().noalias() = X.topRows<3>().transpose() * H_linear;
   LH.rightCols<3>().noalias() = X.bottomRows<3>().transpose() * H_angular;
   inertia_.noalias() = LH.transpose() * LH;
+}
+
+Matrix6 TaskInertia::spread(const Matrix6& dA) const noexcept {
+  const double linear = dA.diagonal().head<3>().mean(), angular = dA.diagonal().tail<3>().mean();
+  Vector6 dD;
+  dD << linear, linear, linear, angular, angular, angular;
+  Matrix6 dE = dD.asDiagonal() * (Matrix6::Identity() - H_ * H_);
+  const Matrix6 dG = H_ * dA * H_ + dE;
+  const Matrix6 of_regular = regular_ * dG * regular_;
+  const double dw =
+      regularity_ * regularity_ * (D_.dot(of_regular.diagonal()) - dD.dot(regular_.diagonal()));
+  const double deficit = 1 - regularity_ / kNearlySingular;
+  dE.diagonal() += kNearlySingular * deficit * deficit * dD - 2 * deficit * dw * D_;
+  return selected_.transpose() * dE * selected_;
 }
 
 }  // namespace dashpot::controller

@@ -32,11 +32,18 @@ class TaskInertia {
   double regularity() const noexcept { return regularity_; }
   /// Returns true if l > 0.
   bool nearly_singular() const noexcept { return !(regularity_ >= kNearlySingular); }
+  /// Returns what a change dA of A, in the axes of the selected directions, changes H G^-1 H by
+  /// through D and l alone, negated: H G^-1 dE G^-1 H with E = (I - H^2) D + l D. Only where the
+  /// arm is nearly singular; elsewhere a projector H makes it zero.
+  Matrix6 spread(const Matrix6& dA) const noexcept;
 
  private:
   Matrix6 inertia_ = Matrix6::Zero();  ///< H G^-1 H
   double regularity_ = 1;
   SmallCholesky factor_;  ///< of G
+  // Where the arm is nearly singular:
+  Matrix6 H_, regular_, selected_;  ///< H, G^-1 with l = 0, G^-1 H
+  Vector6 D_;
 };
 
 }  // namespace dashpot::controller

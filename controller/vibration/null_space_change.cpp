@@ -26,6 +26,31 @@ NullSpaceChange::NullSpaceChange(const DynamicsKernel& kernel, const JointVector
   }
   torque_projector_ = JointMatrix::Identity(n, n);
   torque_projector_ -= J_.transpose().lazyProduct(share_.transpose());
+  spreads_ = null_space.inertia().nearly_singular();
+  if (spreads_) set_spread(null_space);
+}
+
+void NullSpaceChange::set_spread(const NullSpace& null_space) noexcept {
+  const Index n = J_.cols();
+  moved_ = J_.transpose();
+  for (Index i = 0; i < 6; ++i) {
+    null_space.mass().solve_L(&moved_(0, i));
+    null_space.mass().solve_LT(&moved_(0, i));
+  }
+  std::array<Matrix6, kMaxJoints> change;  // of J M^-1 J' by each joint, column by column
+  for (Index i = 0; i < 6; ++i) {
+    const JointVector x = moved_.col(i);
+    const Jacobian turned = twists(x);
+    const Jacobian inert = moved_.transpose().lazyProduct(mass_.times(x));
+    for (Index k = 0; k < n; ++k) {
+      // The inertia's part is symmetric, so that half of it can be mirrored.
+      change[static_cast<std::size_t>(k)].col(i) = turned.col(k) - 0.5 * inert.col(k);
+    }
+  }
+  for (Index k = 0; k < n; ++k) {
+    const Matrix6& half = change[static_cast<std::size_t>(k)];
+    spread_[static_cast<std::size_t>(k)] = null_space.inertia().spread(half + half.transpose());
+  }
 }
 
 Vector6 NullSpaceChange::turning(const Vector6& V, Index k) const noexcept {
@@ -59,6 +84,9 @@ JointMatrix NullSpaceChange::of_joint_velocity(const Vector6& V) const noexcept 
   const JointMatrix inert = torques(inertia_ * V) - mass_.times(x);
   JointMatrix change = mobility_.lazyProduct(inert);
   change -= share_.lazyProduct(twists(x));
+  for (Index k = 0; spreads_ && k < change.cols(); ++k) {
+    change.col(k) -= moved_ * (spread_[static_cast<std::size_t>(k)] * V);
+  }
   return change;
 }
 
@@ -70,6 +98,10 @@ JointMatrix NullSpaceChange::of_torque(const JointVector& t) const noexcept {
   const JointMatrix projected = torques(h) + change;
   change -= torque_projector_.lazyProduct(projected);
   change -= tip_torque_.lazyProduct(twists(z));
+  const Vector6 a = spreads_ ? Vector6(moved_.transpose() * t) : Vector6(Vector6::Zero());
+  for (Index k = 0; spreads_ && k < change.cols(); ++k) {
+    change.col(k) += J_.transpose() * (spread_[static_cast<std::size_t>(k)] * a);
+  }
   return change;
 }
 

@@ -2,13 +2,17 @@
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/controller/model/mass_change.hpp>
 
+#include <array>
+
 namespace dashpot::controller {
 
 /// How the null space's projector N' and J# = M^-1 J' (J M^-1 J')^-1 change with q, where no gains
-/// change and the arm is not nearly singular. With G = H (H J M^-1 J' H)^-1 H of the selected
+/// change. With G = H (H J M^-1 J' H)^-1 H of the selected
 /// directions H, dJ_k = dJ/dq_k and dM_k = dM/dq_k,
 ///     d(J# V)/dq_k = M^-1 N' (dJ_k' G V - dM_k J# V) - J# dJ_k J# V
 ///     d(N' t)/dq_k = -N' dJ_k' h - J' G dJ_k z + (1 - N') dM_k z,    h = J#' t, z = M^-1 N' t.
+/// Where the arm is nearly singular, G changes by -S_k = -TaskInertia::spread as well, which adds
+///     -M^-1 J' S_k V    and    J' S_k J M^-1 t.
 /// Where the selected directions turn with the tool, dJ_k is less by the turning of J's rows.
 class NullSpaceChange {
  public:
@@ -33,13 +37,17 @@ class NullSpaceChange {
  private:
   /// (dJ/dq_k)' F by columns
   JointMatrix torques(const Vector6& F) const noexcept;
+  void set_spread(const NullSpace& null_space) noexcept;
 
   bool tool_;
   Jacobian J_;
   MassChange mass_;
-  Matrix6 inertia_;               ///< G
-  TipMatrix share_, tip_torque_;  ///< J#, J' G
-  JointMatrix mobility_;          ///< M^-1 N'
+  Matrix6 inertia_;                         ///< G
+  TipMatrix share_, tip_torque_;            ///< J#, J' G
+  JointMatrix mobility_;                    ///< M^-1 N'
+  TipMatrix moved_;                         ///< M^-1 J'
+  bool spreads_;                            ///< the arm is nearly singular
+  std::array<Matrix6, kMaxJoints> spread_;  ///< S_k
   JointMatrix torque_projector_;
 };
 
