@@ -19,6 +19,7 @@ constexpr double kHand = 35;        // N, at the tip: a push, or 3 kg that nobod
 constexpr double kFast = 0.5;       // of velocity limits: slower is what somebody pushes
 constexpr double kFastLeast = 1;    // rad/s, or m/s: as fast as a hand pushes, be the limit low
 constexpr double kForgotten = 0.05;  // s
+constexpr double kBlow = 0.03;       // s: a blow ends sooner, what a motor lacks goes on
 
 }  // namespace
 
@@ -48,7 +49,7 @@ void MotionWatch::reset() noexcept {
   first_ = true;
   frozen_ = false;
   torques_ = 0;
-  tip_speed_ = same_ = strained_ = gained_ = 0;
+  tip_speed_ = same_ = strained_ = gained_ = gaining_ = 0;
   energy_ = -1;
   for (Eigen::Index i = 0; i < n_; ++i) {
     const Record& r = joint(i);
@@ -217,9 +218,12 @@ bool MotionWatch::gains(const Tick& tick) noexcept {
     const double most = std::max(kFast * joint.velocity_limit, kFastLeast);
     fast += 0.5 * tick.robot.M(i, i) * most * most;
   }
-  gained_ = std::max(0.0, gained_ + energy_ - last - (given + unsure) * tick.dt);
+  const double more = energy_ - last - (given + unsure) * tick.dt;
+  gained_ = std::max(0.0, gained_ + more);
   if (energy_ < fast) gained_ -= std::min(1.0, tick.dt / kForgotten) * gained_;
-  return gained_ > fast;
+  const double longer = more > 0 ? tick.dt : -tick.dt;
+  gaining_ = gained_ > fast ? std::max(0.0, gaining_ + longer) : 0;
+  return gaining_ > kBlow;
 }
 
 }  // namespace dashpot::controller

@@ -29,7 +29,8 @@ namespace dashpot::controller {
 /// - kBrakeDoubted: the arm gains energy that the torque does not give it. While no springs act,
 ///       s <- max(0, s + dE - x' qd dt - (0.4 |x_i qd_i| + 0.3 |gravity_i qd_i| + 35 N v_tip) dt),
 ///   E being the kinetic energy and x the torque beside the weight, exceeds the energy of joints
-///   with half of their velocity limits, each by itself. So motors that are weak, dead or reversed
+///   with half of their velocity limits, each by itself, and has grown for 30 ms since: a blow
+///   ends sooner. So motors that are weak, dead or reversed
 ///   are found however much gravity explains, and what is wrong by less is not: masses, friction, a
 ///   payload, a push by hand. Below that kinetic energy s decays with 50 ms.
 class MotionWatch {
@@ -110,6 +111,7 @@ class MotionWatch {
   double strained_ = 0;  ///< for how long, meanwhile, the torque has exceeded stiction, s
   double energy_ = -1;   ///< kinetic, J; negative: the last tick had springs
   double gained_ = 0;    ///< s, J
+  double gaining_ = 0;   ///< for how long it has been too large and has grown, s
   std::size_t wall_count_;
   std::array<Record, kMaxJoints> joints_;
   std::array<Wall, kMaxWalls> walls_;

@@ -277,7 +277,7 @@ def test_a_gap_latches_and_the_arm_is_damped(run):
     assert report["faults"] == 1 and report["states"]["lost"] == 50
     assert "gap between states" in report["fault"]
     assert report["tick_statuses"]["fault latched, damping until released"] > 500
-    assert np.abs(robot.written[400:]).max() < 1e-9  # at rest there is nothing to damp
+    assert np.abs(robot.written[400:]).max() < 1e-4  # at rest there is nothing to hold
 
 
 def test_a_released_fault_is_over(run):
@@ -445,7 +445,7 @@ def test_the_tip_moves_where_it_is_told(arm, tmp_path):
 
 def test_a_blow_is_a_fault_and_its_release_takes_up_the_springs(arm, tmp_path):
     arm.begin(settings(limits={"velocity": 0.5}), tmp_path / "log.lcm")
-    arm.tell("push 100 0 0 0 60 0 0 0")
+    arm.tell("push 50 0 0 0 60 0 0 0")
     arm.pass_by(600)
     assert arm.session.fault == dashpot.Status.VELOCITY_LIMIT
     arm.session.controller.release()
