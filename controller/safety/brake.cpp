@@ -26,8 +26,7 @@ constexpr double kSoftest = 8;          // times T
 constexpr double kMemory = 0.5;         // s, ten times as long as the brake needs
 constexpr double kPushed = 0.5;         // of velocity limits: somebody pushes the arm
 constexpr double kPushedLeast = 1;      // rad/s, or m/s: as fast as a hand pushes, be the limit low
-constexpr double kStiff = 1.0 / 3;      // T_h / T
-constexpr double kStiffness = 2.0 / 9;  // times 1 / T_h^2: rates 1 / 3 T_h and 2 / 3 T_h
+constexpr double kStiffness = 2.0 / 9;  // times c^2: with it motion decays with c / 3 and 2 c / 3
 constexpr double kSmooth = 0.1;         // of T: time constant of velocities
 constexpr double kStands = 0.03;        // of a velocity limit
 constexpr double kSlows = 2;            // s: what slows down more slowly is driven
@@ -64,7 +63,6 @@ Brake::Brake(const Settings& settings, double gears) noexcept : n_(settings.limi
   stopping_time_ = std::max(limits.stopping_time, least);
   period_ = settings.period;
   near_ = std::max({kNear * limits.stopping_time, kNearMargin / kMargin * least, gears});
-  stiff_ = gears > 0 ? std::max(stopping_time_, gears) : kStiff * stopping_time_;
   lag_ = lag;
   known_.q = JointVector::Constant(n_, std::numeric_limits<double>::infinity());
   for (Eigen::Index i = 0; i < n_; ++i) {
@@ -107,8 +105,7 @@ JointVector Brake::stop(const Motion& motion, double inward, Resistance resistan
     change[i] = wanted[i] - (stands_ ? v_[i] : v);
   }
   add_product(motion.robot.M, change, momentum);
-  const double fastest = this->fastest(momentum);
-  const double damping = std::min(fastest, 1 / (softness_ * stiff_));
+  const double damping = std::min(fastest(momentum), 1 / stopping_time());
   if (resistance == Resistance::kGrows) {
     resist(motion, wanted, kStiffness * damping * damping);
   } else {
@@ -116,7 +113,7 @@ JointVector Brake::stop(const Motion& motion, double inward, Resistance resistan
   }
   const double left = resistance == Resistance::kFades ? 1 - period_ / kFades : 1;
   for (Eigen::Index i = 0; i < n_; ++i) torque[i] = joint(i).resistance *= left;
-  add(momentum, torque, stands_ ? damping : std::min(fastest, 1 / stopping_time()));
+  add(momentum, torque, damping);
   return torque;
 }
 

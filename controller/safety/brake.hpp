@@ -30,15 +30,15 @@ double loop_lag(const Settings& settings) noexcept;
 /// a stop longer, and drives no arm back.
 ///
 /// Once the arm stands, `stop` holds it. It stands if each joint is slower than 3 % of its velocity
-/// limit, or gets faster than it was by that much. From then on, with T_h = T / 3 (with elastic
-/// gears T, or what they tolerate) and v the velocity smoothed over T / 10,
-///     x = c_h M (v_wanted - v) + r,   r <- r - (2/9) c_h^2 M (q - last q),
-/// c_h being c with T_h for T. So r is a spring M 2 / (9 T_h^2) about where the arm stood, which
-/// never drifts because differences of positions add up; with c_h = 1 / T_h all motion decays with
-/// 3 T_h and 3/2 T_h. An unknown torque e moves the arm by (9/2) T_h^2 M^-1 e. r is bounded to half
-/// of the torque limit in each joint: whoever pushes harder moves the arm, the place that is held
-/// goes along, and when let go the arm springs back by what r deflects. r does not grow where a
-/// torque limit is reached. It waits while the springs' torque fades, and fades with a time
+/// limit, or gets faster than it was by that much. From then on, with v the velocity smoothed over
+/// T / 10,
+///     x = c M (v_wanted - v) + r,   r <- r - (2/9) c^2 M (q - last q).
+/// So r is a spring M 2 / (9 T^2) about where the arm stood, which never drifts because differences
+/// of positions add up; with c = 1 / T all motion decays with 3 T and 3/2 T. A stiffer one vibrates
+/// where states are 30 ms late. An unknown torque e moves the arm by (9/2) T^2 M^-1 e. r is bounded
+/// to half of the torque limit in each joint: whoever pushes harder moves the arm, the place that
+/// is held goes along, and when let go the arm springs back by what r deflects. r does not grow
+/// where a torque limit is reached. It waits while the springs' torque fades, and fades with a time
 /// constant of half a second where nobody sees the motion. A joint on its way back from outside a
 /// limit adds to r only where it moves outward. A larger inertia than the model's makes the hold
 /// softer and less damped; no smaller gain makes it unstable, so it needs no second integral.
@@ -210,7 +210,6 @@ class Brake {
   Eigen::Index n_;
   double stopping_time_;  ///< T
   double near_;           ///< t
-  double stiff_;          ///< T_h
   double lag_;
   double period_;
   double softness_ = 1;  ///< of this stop: what its T is multiplied by

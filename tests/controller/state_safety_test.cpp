@@ -118,7 +118,7 @@ TEST_F(Safety, WrongTimeStampsDropNoArm) {
     const JointVector start = arm->state.position;
     const std::int64_t from = arm->state.time;
     std::int64_t passed = 0;
-    for (int k = 0; k < 1000; ++k) {
+    for (int k = 0; k < 1500; ++k) {
       arm->state.time = from + clocks[clock](passed += 1'000'000);
       arm->state.external_wrench[0] = k >= 400 && k < 418 ? 10 : 0;  // somebody bumps into it
       arm->setpoint.time = arm->state.time;
