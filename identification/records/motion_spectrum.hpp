@@ -1,5 +1,5 @@
 #pragma once
-#include <Eigen/Core>
+#include <dashpot/analysis/matrix_types.hpp>
 
 namespace dashpot::identification {
 
