@@ -2,6 +2,7 @@
 #include <dashpot/controller/check_model.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 #include <dashpot/tests/support/torque_record.hpp>
 
@@ -112,6 +113,7 @@ TEST(CheckModel, FindsFrictionOffsetsAndPayload) {
 }
 
 TEST(CheckModel, HoldsItsIntervalsInColouredNoise) {
+  DASHPOT_SKIP_IF_QUICK();
   RecordedArm arm = loaded_panda();
   arm.slow_noise = 0.15;
   int within = 0, all = 0;

@@ -81,7 +81,7 @@ TEST_P(LongRamp, HoldsTheWeightForTwoSecondsAndStartsAfresh) {
   const JointVector step = settings.limits.torque_rate * settings.period;
   for (int k = 0; k < 2150; ++k) {
     arm->state = good;
-    arm->state.time += 1'000'000 * k;
+    arm->state.time += std::int64_t{1'000'000} * k;
     spoil(arm->state);
     EXPECT_EQ(tick(), expected());
     if (k > 200 && k < 1990) ASSERT_TRUE(near(arm->torque, weight, 1e-3)) << k;
