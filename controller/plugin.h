@@ -52,8 +52,8 @@ typedef struct dashpot_controller dashpot_controller;
  * this list, is returned. Before DASHPOT_SETPOINT_STALE the torque is that of the springs, dampers
  * and feed-forward, within the limits. From there on each status names its output:
  *   hold: the springs stop where they are, whatever the set-point says; no commanded wrench.
- *   damp: there are no springs, only a brake, and the weight of the arm where the controller
- *         compensates it.
+ *   damp: a brake, which holds the arm once it stands, and the weight of the arm where the
+ *         controller compensates it.
  *   ramp: the last torque for watchdog.longest_gap; then the last known weight, and a brake by what
  *         the model says of the last good state; after 2 s the torque goes to zero within 0.1 s.
  * Where damp and ramp take torque away, it fades evenly, in all joints alike.
@@ -407,7 +407,7 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
  * compensates it). Refuses a position beyond the limits of the URDF, as that of degrees is, and a
  * torque that contradicts the weight (`watchdog.start_torque`; none accepts it). Takes some
  * milliseconds and allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error then says
- * more. A loop without this call starts from the weight as well, but with gains that were not
+ * more, and with DASHPOT_OK, where it is not empty, that limits.torque_rate makes stops slow. A loop without this call starts from the weight as well, but with gains that were not
  * judged at its posture. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 
@@ -511,10 +511,12 @@ int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* 
 int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes);
 int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes);
 
-/* Returns 1 for a status with which the host has to end the motion at once and to engage the
- * robot's own brakes, because no torque is known to be right: DASHPOT_STATE_FROZEN,
- * DASHPOT_STATE_CONTRADICTORY and DASHPOT_BRAKE_DOUBTED. Returns 0 for any other. */
-int32_t dashpot_needs_brakes(int32_t status);
+/* Returns 1 where the host has to end the motion at once and to engage the robot's own brakes,
+ * because no torque is known to be right: with the status of a tick DASHPOT_STATE_FROZEN,
+ * DASHPOT_STATE_CONTRADICTORY or DASHPOT_BRAKE_DOUBTED; and, where `fault`
+ * (dashpot_snapshot.fault) is not DASHPOT_OK, with DASHPOT_STATE_NOT_FINITE and all after it.
+ * Returns 0 otherwise. */
+int32_t dashpot_needs_brakes(int32_t status, int32_t fault);
 
 /* Return a short English text for what a function returned ("torque limited"), and for the kind of
  * a mode ("underdamped"); never NULL. */
@@ -550,7 +552,7 @@ typedef struct dashpot_plugin {
   int32_t (*read_modes)(dashpot_controller*, dashpot_modes*);
   int32_t (*read_sampled_modes)(dashpot_controller*, dashpot_sampled_modes*);
   const char* (*status_text)(int32_t);
-  int32_t (*needs_brakes)(int32_t);
+  int32_t (*needs_brakes)(int32_t, int32_t);
   const char* (*kind_text)(int32_t);
 } dashpot_plugin;
 

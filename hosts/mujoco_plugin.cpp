@@ -86,7 +86,11 @@ class Arm {
         position_[i] = data->qpos[model->jnt_qposadr[joints_[i]]];
         velocity_[i] = data->qvel[model->jnt_dofadr[joints_[i]]];
       }
-      if (!started_ && dashpot_start(controller_.get(), position_.data(), nullptr) != DASHPOT_OK) {
+      const std::int32_t begun =
+          started_ ? DASHPOT_OK : dashpot_start(controller_.get(), position_.data(), nullptr);
+      // MuJoCo tries one step when it compiles a model, wherever the arm then is.
+      if (begun == DASHPOT_WRONG_VALUE && data->time == 0) return true;
+      if (begun != DASHPOT_OK) {
         reason = dashpot_last_error();
         return false;
       }
@@ -235,7 +239,7 @@ class Arm {
 
   /// Once for each fault.
   void tell_of_brakes() noexcept {
-    const bool needed = dashpot_needs_brakes(snapshot_.status) != 0;
+    const bool needed = dashpot_needs_brakes(snapshot_.status, snapshot_.fault) != 0;
     if (needed && !told_) {
       std::fprintf(stderr, "dashpot.impedance: %s: a robot would have to engage its brakes\n",
                    dashpot_status_text(snapshot_.status));

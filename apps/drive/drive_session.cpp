@@ -178,7 +178,7 @@ bool DriveSession::take(const DriverStatus& status, std::int64_t arrived, std::i
   // The message wants one; it is what the driver itself commands with --torque_only.
   command.position = options_.driver == DriverKind::kIiwa ? last_position_ : JointVector();
   command.torque = torque_;
-  if (controller_.needs_brakes(code)) engage(code, command);
+  if (controller_.needs_brakes(code, journal_.record.fault)) engage(code, command);
   return true;
 }
 
@@ -344,6 +344,7 @@ void DriveSession::begin(const DriverStatus& status) {
   if (controller_.start(status.position, reason) != DASHPOT_OK) {
     throw InputError("gains", "the controller refuses to start here: " + reason);
   }
+  if (!reason.empty()) warning_ = reason;
   controller::Setpoint setpoint = config_.settings.initial;
   setpoint.joint_position = status.position;
   const auto there = controller::evaluate(config_.model, status.position, JointVector::Zero(n_));

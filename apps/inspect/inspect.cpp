@@ -5,9 +5,11 @@
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/rotors.hpp>
+#include <dashpot/controller/stopping.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
@@ -24,6 +26,7 @@ using controller::DynamicsResult;
 using controller::Joint;
 using controller::JointVector;
 using controller::RobotModel;
+using controller::Stopping;
 using Align = TextTable::Align;
 
 struct InspectOptions {
@@ -119,13 +122,15 @@ std::string to_json(const InspectOptions& options, const RobotModel& model,
                                    {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
                                    {"tip_position", json_list(dynamics.p_BT_B)},
                                    {"tip_rotation", json_rows(dynamics.R_BT)}};
+  const Stopping stops = controller::stopping(model, controller::default_settings(model), q);
+  result["stop"] = {{"time", json_list(stops.time)}, {"way", json_list(stops.way)}};
   for (const std::string& warning : model.warnings()) result["warnings"].push_back(warning);
   if (!options.drives.empty()) result["drives"] = drives_json(options.drives);
   return result.dump(2, ' ', true) + "\n";
 }
 
-std::vector<std::string> numbers(const Eigen::VectorXd& values) {
-  return format_column({values.begin(), values.end()}, 6);
+std::vector<std::string> numbers(const Eigen::VectorXd& values, int digits = 6) {
+  return format_column({values.begin(), values.end()}, digits);
 }
 
 /// One row for each joint.
@@ -167,11 +172,12 @@ std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics
 }
 
 /// Rows under joint numbers.
-std::string matrix_table(const Eigen::MatrixXd& matrix, const std::vector<std::string>& names) {
+std::string matrix_table(const Eigen::MatrixXd& matrix, const std::vector<std::string>& names,
+                         int digits = 6) {
   TextTable table;
   table.add_column(Align::kLeft, {""}, names);
   for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
-    table.add_column(Align::kPoint, {std::to_string(j + 1)}, numbers(matrix.col(j)));
+    table.add_column(Align::kPoint, {std::to_string(j + 1)}, numbers(matrix.col(j), digits));
   }
   return table.text();
 }
@@ -222,6 +228,14 @@ std::string rotors_text(const InspectOptions& options, const RobotModel& model) 
          controller::rotors_hint(model, "--reflected-inertia", "--drives", "\n") + "\n";
 }
 
+std::string stop_table(const RobotModel& model, const JointVector& q) {
+  const Stopping stops = controller::stopping(model, controller::default_settings(model), q);
+  Eigen::MatrixXd rows(2, model.dof());
+  rows << stops.time.transpose(), stops.way.transpose();
+  return "\nStop of a joint alone from 0.9 of its velocity limit, with the default settings\n" +
+         matrix_table(rows, {"time, s", "way, rad or m"}, 2);
+}
+
 std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, const JointVector& q,
                      const JointVector& qd) {
   std::vector<std::string> joints;
@@ -234,7 +248,7 @@ std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, co
          matrix_table(dynamics.M, joints) + "\nJacobian at the tip\n" +
          matrix_table(dynamics.J,
                       {"linear x", "linear y", "linear z", "angular x", "angular y", "angular z"}) +
-         "\nTip\n" + tip_table(dynamics);
+         "\nTip\n" + tip_table(dynamics) + stop_table(model, q);
 }
 
 void run_inspect(const InspectOptions& options) {

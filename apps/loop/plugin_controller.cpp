@@ -41,8 +41,8 @@ class PluginController : public LoopController {
   }
 
   void stop() noexcept override { plugin_.stop(handle_.get()); }
-  bool needs_brakes(std::int32_t status) const noexcept override {
-    return plugin_.needs_brakes(status) != 0;
+  bool needs_brakes(std::int32_t status, std::int32_t fault) const noexcept override {
+    return plugin_.needs_brakes(status, fault) != 0;
   }
 
   const dashpot_snapshot& snapshot() noexcept override {

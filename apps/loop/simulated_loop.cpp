@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace dashpot::apps {
 namespace {
@@ -55,10 +56,11 @@ ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
 void ClosedLoop::begin() {
   const controller::Setpoint& first = scene_.steps.front().setpoint;
   std::string reason;
-  if (controller_.start(scene_.outside_limits ? scene_.start : scene_.rest, reason) != DASHPOT_OK ||
-      controller_.set_gains(first.gains, reason) != DASHPOT_OK) {
-    throw InputError("scenario.start", "the controller refuses it: " + reason);
-  }
+  const JointVector& rest = scene_.outside_limits ? scene_.start : scene_.rest;
+  bool starts = controller_.start(rest, reason) == DASHPOT_OK;
+  if (starts && !reason.empty()) std::fprintf(stderr, "warning: %s\n", reason.c_str());
+  starts = starts && controller_.set_gains(first.gains, reason) == DASHPOT_OK;
+  if (!starts) throw InputError("scenario.start", "the controller refuses it: " + reason);
   goal_.begin(first, scene_.arm->config.model.attachment());
 }
 

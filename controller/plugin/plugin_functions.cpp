@@ -4,6 +4,7 @@
 #include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
+#include <dashpot/controller/stopping.hpp>
 
 #include <algorithm>
 #include <array>
@@ -209,10 +210,12 @@ int32_t dashpot_start(dashpot_controller* controller, const double* position,
   const bool holds = controller->settings.feed_forward.gravity;
   const JointVector held = holds ? weight_of(*controller, controller->request.attachment, q)
                                  : JointVector(JointVector::Zero(controller->n));
+  std::string slow;
   try {
     const std::string fault = start_fault(controller->model, controller->settings, q,
                                           holds ? acting : JointVector(), held);
     if (!fault.empty()) return finish(DASHPOT_WRONG_VALUE, fault.c_str());
+    slow = slow_stop(controller->model, controller->settings, q);
   } catch (const std::exception& error) {
     return finish(DASHPOT_WRONG_VALUE, error.what());
   }
@@ -220,7 +223,7 @@ int32_t dashpot_start(dashpot_controller* controller, const double* position,
   if (code != DASHPOT_OK) return code;
   controller->judgement.locate(q);
   controller->reset(torque != nullptr ? acting : held);
-  return DASHPOT_OK;
+  return slow.empty() ? DASHPOT_OK : warn(slow.c_str());
 }
 
 int32_t dashpot_release(dashpot_controller* controller) {
@@ -370,8 +373,9 @@ const char* dashpot_status_text(int32_t status) {
   return to_text(static_cast<Status>(status));
 }
 
-int32_t dashpot_needs_brakes(int32_t status) {
-  return status == DASHPOT_STATE_FROZEN || status == DASHPOT_STATE_CONTRADICTORY ||
+int32_t dashpot_needs_brakes(int32_t status, int32_t fault) {
+  const bool lost = status >= DASHPOT_STATE_NOT_FINITE && fault != DASHPOT_OK;
+  return lost || status == DASHPOT_STATE_FROZEN || status == DASHPOT_STATE_CONTRADICTORY ||
                  status == DASHPOT_BRAKE_DOUBTED
              ? 1
              : 0;

@@ -59,10 +59,6 @@ class Status(enum.IntEnum):
         """A short English text."""
         return _core.status_text(int(self))
 
-    @property
-    def needs_brakes(self) -> bool:
-        """True if the host has to end the motion at once and to engage the robot's own brakes."""
-        return _core.needs_brakes(int(self))
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -303,10 +299,18 @@ class Controller:
             None if external_wrench is None else np.asarray(external_wrench, dtype=np.float64))
         return torque, Status(status)
 
+    def needs_brakes(self, status: Status) -> bool:
+        """True if, after a tick with that status, the host has to end the motion at once and to
+        engage the robot's own brakes: no torque is known to be right, or no state came for long."""
+        snapshot = self.snapshot()
+        return snapshot is not None and _core.needs_brakes(int(status), int(snapshot.fault))
+
     def start(self, q: npt.ArrayLike, torque: npt.ArrayLike | None = None) -> None:
         """Prepares the loop with the robot at rest at q (n, rad), where it applies `torque` (n, N m;
-        None: its weight). Raises Error for gains with too small a gain margin there."""
-        self._core.start(to_numbers("q", q, 1).reshape(-1, 1), _column(to_vector("torque", torque)))
+        None: its weight). Raises Error for gains with too small a gain margin there. Warns of a
+        limits.torque_rate that makes stops slow."""
+        _warn(self._core.start(to_numbers("q", q, 1).reshape(-1, 1),
+                               _column(to_vector("torque", torque))))
 
     def reset(self, torque: npt.ArrayLike | None = None) -> None:
         """Forgets history, faults and set-point, but not the gains. The torque-rate limit counts

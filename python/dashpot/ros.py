@@ -171,7 +171,9 @@ class ModesNode:
             self.ended = self.ended or self._stop
             return
         left = self._ending.left(time, self._q) if self._stop else 1.0
-        if status.needs_brakes:  # a topic has no brakes: nothing pulls any more
+        if self.controller.needs_brakes(status) and not (
+                status >= Status.STATE_NOT_FINITE and torque.any()):  # the last weight, for 2 s
+            # A topic has no brakes: nothing pulls any more.
             self._fail(f"{status.text}: the last torque was zero")
             left = 0.0
         torque = left * torque

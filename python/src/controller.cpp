@@ -192,7 +192,8 @@ nb::tuple update(Host& host, std::int64_t time, const Eigen::VectorXd& q, const 
   return nb::make_tuple(torque, status);
 }
 
-void start(Host& host, const Eigen::MatrixXd& q, const OptionalMatrix& torque) {
+/// Returns what to be warned of; "" if nothing.
+std::string start(Host& host, const Eigen::MatrixXd& q, const OptionalMatrix& torque) {
   const auto n = static_cast<Eigen::Index>(host.joints());
   Numbers numbers;
   const double* const position = numbers.add("q", q, n, 1);
@@ -200,6 +201,7 @@ void start(Host& host, const Eigen::MatrixXd& q, const OptionalMatrix& torque) {
   const nb::gil_scoped_release release;
   const std::scoped_lock lock(host.loop, host.other);
   check(dashpot_start(host.get(), position, acting));
+  return dashpot_last_error();
 }
 
 void reset(Host& host, const OptionalMatrix& torque) {
@@ -341,7 +343,7 @@ nb::dict loop_of(const Host& host) {
 
 void add_controller(nb::module_& m) {
   m.def("status_text", [](int status) { return dashpot_status_text(status); });
-  m.def("needs_brakes", [](int status) { return dashpot_needs_brakes(status) != 0; });
+  m.def("needs_brakes", [](int status, int fault) { return dashpot_needs_brakes(status, fault) != 0; });
   nb::class_<Host>(m, "Controller", "dashpot_controller of controller/plugin.h")
       .def_static("from_text", &from_text, nb::call_guard<nb::gil_scoped_release>())
       .def_static("from_file", &from_file, nb::call_guard<nb::gil_scoped_release>())

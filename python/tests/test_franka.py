@@ -92,6 +92,7 @@ class MovingRobot(MadeUpRobot):
     def __init__(self, **options):
         super().__init__(**options)
         self.q, self.dq, self.speeds, self.frozen = np.array(HOME), np.zeros(7), [], None
+        self.lost = 0  # states that have no velocity
         self.inertia = np.array(self.ARM.mass(HOME))
 
     def read_once(self):
@@ -102,6 +103,9 @@ class MovingRobot(MadeUpRobot):
             seen.q, seen.dq = self.frozen.q, self.frozen.dq
             seen.time = State(self.tick).time
         self.last = seen
+        if self.lost:
+            self.lost -= 1
+            seen.dq = np.full(7, np.nan)
         return seen
 
     def freeze(self):
@@ -230,6 +234,17 @@ def test_what_moves_on_delays_the_end_by_a_second_at_most(run):
     report = run(robot, duration=1)
     assert report["failure"] is None and robot.speeds[-1] > 0.1
     assert len(robot.written) == 1001 + 1000 + 200
+
+
+@pytest.mark.parametrize("ticks", [5, 1000])
+def test_a_state_that_is_lost_ends_the_motion_when_its_fault_latches(run, ticks):
+    robot = MovingRobot(events={1000: lambda robot: setattr(robot, "lost", ticks)})
+    report = run(robot, duration=1.5)
+    if ticks == 5:
+        assert report["failure"] is None and report["faults"] <= 1 and report["fault"] is None
+    else:
+        assert report["failure"].startswith("state not finite")
+        assert 1010 <= len(robot.finished) <= 1013 and robot.finished[-1]
 
 
 def test_an_arm_that_needs_its_brakes_ends_the_motion_at_once(run, capfd):

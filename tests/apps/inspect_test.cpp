@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -60,7 +61,7 @@ Rows rows_of(const Eigen::MatrixXd& matrix) {
 /// Compares the object with KDL's numbers.
 void expect_matches(const Json& result, const controller::DynamicsResult& expected) {
   const auto vector = [](const Eigen::MatrixXd& v) { return rows_of(v.transpose()); };
-  EXPECT_EQ(result.size(), 10u);
+  EXPECT_EQ(result.size(), 11u);
   expect_near(result["mass_matrix"], rows_of(expected.M), 1e-12);
   expect_near({result["coriolis"]}, vector(expected.coriolis), 1e-12);
   expect_near({result["gravity"]}, vector(expected.gravity), 1e-12);
@@ -97,6 +98,7 @@ TEST(Inspect, TakesTheMiddleOfTheLimitsAndEarthsGravityUnlessToldOtherwise) {
                                          "0,0,0,0,0,0,0", "--gravity", "0,0,-9.81"}));
   EXPECT_EQ(plain, told);
   EXPECT_EQ(plain["coriolis"], Json(Numbers(7, 0.0)));
+  EXPECT_NEAR(plain["stop"]["time"][6].get<double>(), 0.05 * std::log(10), 0.002);  // no limit acts
   const Json upside_down = parse(inspect_panda({"--json", "--gravity", "0,0,9.81"}));
   for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_EQ(upside_down["gravity"][i].get<double>(), -plain["gravity"][i].get<double>());

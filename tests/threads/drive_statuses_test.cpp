@@ -112,6 +112,24 @@ class DriveStatuses : public ::testing::TestWithParam<Arm> {
     }
     return summary_of(driving);
   }
+  /// The program ends by itself and names `status`; one tick had the status `once`.
+  void ends(const std::string& status, const std::string& once) {
+    const auto end = Clock::now() + std::chrono::seconds(30);
+    while (!driving.ended() && Clock::now() < end) writer.step(100);
+    driving.send(SIGTERM);  // for the case that it goes on
+    EXPECT_EQ(driving.finish(), 1);
+    const Json result = Json::parse(driving.output());
+    for (const std::string& said : {driving.complaints(), result["ended"].get<std::string>()}) {
+      EXPECT_THAT(said, HasSubstr(status));
+      EXPECT_THAT(said, HasSubstr("nothing more is sent"));
+    }
+    if (!once.empty()) EXPECT_EQ(result["tick_statuses"][once], 1) << result.dump(2);
+    const DriverCommand& last = writer.commands.back();
+    EXPECT_TRUE(last.torque.size() == 7 && last.torque.isZero(0)) << last.torque.transpose();
+    const bool panda = arm.kind == DriverKind::kPanda;
+    EXPECT_EQ(last.control_mode, panda ? 0 : 4);  // the Panda's driver ends at another one
+    if (!panda) EXPECT_TRUE(last.position.allFinite());
+  }
   /// After some statuses that were answered.
   void begin() {
     writer.steps(20);
@@ -166,21 +184,19 @@ TEST_P(DriveStatuses, AnArmThatNeedsItsBrakesEndsIt) {
     writer.step(100);
   }
   writer.frozen = true;
-  const auto end = Clock::now() + std::chrono::seconds(30);
-  while (!driving.ended() && Clock::now() < end) writer.step(100);
-  driving.send(SIGTERM);  // for the case that it goes on
-  EXPECT_EQ(driving.finish(), 1);
-  const Json result = Json::parse(driving.output());
-  for (const std::string& said : {driving.complaints(), result["ended"].get<std::string>()}) {
-    EXPECT_THAT(said, HasSubstr("state frozen"));
-    EXPECT_THAT(said, HasSubstr("nothing more is sent"));
-  }
-  EXPECT_EQ(result["tick_statuses"]["state frozen, holding the weight"], 1) << result.dump(2);
-  const DriverCommand& last = writer.commands.back();
-  EXPECT_TRUE(last.torque.size() == 7 && last.torque.isZero(0)) << last.torque.transpose();
-  const bool panda = arm.kind == DriverKind::kPanda;
-  EXPECT_EQ(last.control_mode, panda ? 0 : 4);  // the Panda's driver ends at another one
-  if (!panda) EXPECT_EQ(last.position, writer.next.position);
+  ends("state frozen", "state frozen, holding the weight");
+}
+
+TEST_P(DriveStatuses, AnArmWhoseStateIsLostForLongEndsIt) {
+  begin();
+  const JointVector place = writer.next.position;
+  writer.next.position.setConstant(std::numeric_limits<double>::quiet_NaN());
+  writer.steps(5);
+  writer.next.position = place;
+  writer.steps(5);
+  EXPECT_FALSE(driving.ended());  // a few are no fault
+  writer.next.position.setConstant(std::numeric_limits<double>::quiet_NaN());
+  ends("state not finite", "");
 }
 
 TEST_P(DriveStatuses, ADriverThatWasRestartedIsNotAnsweredAtOnce) {

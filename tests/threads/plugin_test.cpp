@@ -268,12 +268,17 @@ TEST(Plugin, StopsUntilThereIsANewSetpoint) {
 }
 
 TEST(Plugin, NamesTheStatusesThatNeedTheRobotsBrakes) {
-  std::set<std::int32_t> found;
+  std::set<std::int32_t> always, latched;
   for (std::int32_t status = -300; status < 300; ++status) {
-    if (plugin().needs_brakes(status) != 0) found.insert(status);
+    if (plugin().needs_brakes(status, DASHPOT_OK) != 0) always.insert(status);
+    if (plugin().needs_brakes(status, DASHPOT_TIME_GAP) != 0) latched.insert(status);
   }
-  EXPECT_EQ(found, (std::set<std::int32_t>{DASHPOT_STATE_FROZEN, DASHPOT_STATE_CONTRADICTORY,
-                                           DASHPOT_BRAKE_DOUBTED}));
+  const std::set<std::int32_t> doubts{DASHPOT_STATE_FROZEN, DASHPOT_STATE_CONTRADICTORY,
+                                      DASHPOT_BRAKE_DOUBTED};
+  EXPECT_EQ(always, doubts);
+  for (std::int32_t status : doubts) EXPECT_EQ(latched.erase(status), 1U);
+  EXPECT_EQ(*latched.begin(), DASHPOT_STATE_NOT_FINITE);  // and what is worse: no known status
+  EXPECT_EQ(latched.count(DASHPOT_NOT_FINITE), 1U);
 }
 
 TEST(Plugin, IsResetToHoldWhereTheRobotIs) {
