@@ -18,8 +18,8 @@ constexpr double kUnweighed = 0.3;  // of the weight
 constexpr double kHand = 35;        // N, at the tip: a push, or 3 kg that nobody knows of
 constexpr double kFast = 0.5;       // of velocity limits: slower is what somebody pushes
 constexpr double kFastLeast = 1;    // rad/s, or m/s: as fast as a hand pushes, be the limit low
-constexpr double kForgotten = 0.05;  // s
-constexpr double kBlow = 0.03;       // s: a blow ends sooner, what a motor lacks goes on
+constexpr double kForgotten = 0.05;    // s
+constexpr double kLongestBlow = 0.03;  // s: a blow ends sooner, what a motor lacks goes on
 
 }  // namespace
 
@@ -223,7 +223,7 @@ bool MotionWatch::gains(const Tick& tick) noexcept {
   if (energy_ < fast) gained_ -= std::min(1.0, tick.dt / kForgotten) * gained_;
   const double longer = more > 0 ? tick.dt : -tick.dt;
   gaining_ = gained_ > fast ? std::max(0.0, gaining_ + longer) : 0;
-  return gaining_ > kBlow;
+  return gaining_ > kLongestBlow;
 }
 
 }  // namespace dashpot::controller

@@ -341,7 +341,8 @@ bool work(const stress::Request& request) {
   bool good = true;
   for (const TestArm& arm : stress::test_arms()) {
     const std::string name = arm.name;
-    if (name != "panda" && name != "fr3" && name != "iiwa14+rotors" && name != "ur5") continue;
+    if (name != "panda+rotors" && name != "fr3" && name != "iiwa14+rotors" && name != "ur5")
+      continue;
     std::mt19937_64 engine(request.seed);
     Seen seen;
     for (const double factor : {1.1, 0.9}) Work(arm, factor, rounds, engine, seen).run();
