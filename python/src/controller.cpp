@@ -343,7 +343,8 @@ nb::dict loop_of(const Host& host) {
 
 void add_controller(nb::module_& m) {
   m.def("status_text", [](int status) { return dashpot_status_text(status); });
-  m.def("needs_brakes", [](int status, int fault) { return dashpot_needs_brakes(status, fault) != 0; });
+  m.def("needs_brakes",
+        [](int status, int fault) { return dashpot_needs_brakes(status, fault) != 0; });
   nb::class_<Host>(m, "Controller", "dashpot_controller of controller/plugin.h")
       .def_static("from_text", &from_text, nb::call_guard<nb::gil_scoped_release>())
       .def_static("from_file", &from_file, nb::call_guard<nb::gil_scoped_release>())
