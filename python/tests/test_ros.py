@@ -181,22 +181,23 @@ gains: {{joint: {{stiffness: 20, damping_ratio: 0.7}}}}
         assert "torques commanded: " in process.stdout.read()
 
 
-def test_an_arm_that_needs_its_brakes_ends_it(peer):
-    """Joint states that do not change, though the arm is said to move."""
+@pytest.mark.parametrize("velocity, status", [(0.1, "state frozen"), (np.nan, "state not finite")])
+def test_an_arm_that_needs_its_brakes_ends_it(peer, velocity, status):
+    """Joint states that do not change, though the arm is said to move; and lost velocities."""
     with start(CONFIG, "--torque-topic", "/effort") as process:
         k, limit = 0, time.monotonic() + 60
         while process.poll() is None and time.monotonic() < limit:
             k += 1
             moves = "/effort" in peer.heard
             q = np.array(HOME) + (0 if moves else 1e-9 * (k % 7))
-            peer.send(q, [0.1 * moves] * 7, time_ns=k * 1_000_000)
+            peer.send(q, [velocity if moves else 0.0] * 7, time_ns=k * 1_000_000)
             rclpy.spin_once(peer.node, timeout_sec=0.01)
         process.terminate()  # if it did not end by itself
         assert process.wait(60) == 1
         for _ in range(50):
             rclpy.spin_once(peer.node, timeout_sec=0.01)
         assert np.abs(peer.heard["/effort"].data).max() == 0
-        assert "state frozen" in process.stderr.read()
+        assert status in process.stderr.read()
 
 
 def test_another_period_is_refused(peer):
