@@ -38,14 +38,13 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 /// out may grow together before the loop becomes unstable, to six digits. It is the first boundary
 /// above 1, searched in steps of a quarter, or infinity if there is none up to `most`. Where the
 /// loop is unstable as it is, the result is the first boundary below 1, or zero if there is none
-/// down to 1e-3. Motions with |log z| / T below `slowest`, rad/s, do not count, because a
-/// self-motion fed by gravity compensation with a zero-order hold is no vibration; where the state
-/// has more than 100 rows, in sample_loop's fewer ones for a delay and a filter, `slowest` is at
-/// least 1e-6 / T. The search takes ten to some tens of eigenproblems, or, with more than 100 rows,
+/// down to 1e-3. Motions with |log z| / T below SampledLoop::slowest do not count; where the state
+/// has more than 100 rows, in sample_loop's fewer ones for a delay and a filter, that is at least
+/// 1e-6 / T. The search takes ten to some tens of eigenproblems, or, with more than 100 rows,
 /// of counts whose work does not grow with the delay. Throws like sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
-                   double most = 1e6, double slowest = 0);
+                   double most = 1e6);
 
 /// Returns whether gain_margin is at least `margin`, from the few factors that its search would try
 /// up to there; of a margin below 1 this is whether the loop is stable with it or as it is. Throws
@@ -55,7 +54,6 @@ bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const Samp
 
 /// Returns the gain margin of an elastic form, without a spectrum.
 template <int N>
-double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double most = 1e6,
-                   double slowest = 0);
+double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double most = 1e6);
 
 }  // namespace dashpot::analysis

@@ -1,10 +1,8 @@
 #pragma once
-#include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/controller/base/impedance.hpp>
-#include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/elastic_joints.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -16,7 +14,8 @@
 namespace dashpot::controller {
 
 /// The gains of a controller and the loop that they act in, as its documentation states them.
-struct AuditOptions {
+/// Without a period no gain margin is computed, and in it alone an integral counts.
+struct AuditOptions : LoopTiming {
   Mode mode = Mode::kCartesian;  ///< which of the gains act
   /// Stiffness and damping as stated. The ratios and `directions` in it are not read: a direction
   /// of the task without stiffness and damping is free. Joint matrices and null-space vectors
@@ -31,16 +30,7 @@ struct AuditOptions {
   /// L_v = (J_v M^-1 J_v')^-1, L_w likewise. Stiffness is then in 1/s^2, damping in 1/s, and each
   /// has one number for the three translations and one for the three rotations.
   bool inertia_blocks = false;
-  /// Period of the control loop, s; zero: no gain margin is computed.
-  double period = 0;
-  int delay = 0;                     ///< ticks from a torque to its effect, beyond the hold
-  double cutoff = 0;                 ///< of a first-order low-pass on the torque, Hz; 0: none
-  bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / period as velocity
   double margin = 2;  ///< gain margin that is asked for, see PostureAudit::rotors; at least 1
-  /// Time of the integral of the springs of task or joints, s: their pull adds up to a torque or
-  /// wrench that grows by pull / integral_time (see Integral::time). 0: none. Counts in the gain
-  /// margin.
-  double integral_time = 0;
   /// True if the null space's springs and dampers act through the projector N = I - J^+ J of the
   /// pseudo-inverse, as many controllers have it. It ignores the inertia, so that they act on the
   /// tip as well. False: through the dynamically consistent one, see NullSpace.
@@ -58,7 +48,7 @@ struct PostureNumbers {
   /// smallest real part, 1/s; negative in a damped loop.
   double fastest_pole = std::numeric_limits<double>::quiet_NaN();
   /// Factor by which stiffness and damping may grow together, see analysis::gain_margin; motions
-  /// slower than the soft frequency do not count. Infinite if a factor of 1e6 is not too much; NaN
+  /// slower than kSlowestVibration do not count. Infinite if a factor of 1e6 is not too much; NaN
   /// without a period, and where the eigenvalue iteration fails.
   double gain_margin = std::numeric_limits<double>::quiet_NaN();
   int zero_modes = 0;     ///< motions that no spring resists, soft ones included
@@ -77,6 +67,9 @@ struct MissingRotors {
   PostureNumbers numbers;          ///< with these rotors
   Eigen::VectorXd damping_ratios;  ///< with them, of the modes likest to those without
 };
+
+/// Returns the numbers of the continuous loop that a spectrum has.
+PostureNumbers numbers_of(const analysis::Spectrum<>& spectrum);
 
 /// A posture in full.
 struct PostureAudit {
@@ -127,8 +120,9 @@ struct DampingSuggestion {
 ///     mode kJoint:     K = K_q,                  C = C_q + viscous friction,
 /// at rest, where the springs are at rest. The gain margin counts an integral of the springs as
 /// well; ratios and poles are those without it. M has the reflected inertia and the payload of the
-/// model, and viscous friction is the model's. Gravity is taken to be compensated exactly. With
-/// elastic joints the loop is that of analysis::Gears.
+/// model, and viscous friction is the model's. Gravity is compensated exactly in the modes, and in
+/// the gain margin as late as LoopTiming says. With elastic joints the loop is that of
+/// analysis::Gears.
 ///
 /// An Audit does not change: several threads may use one at once.
 class Audit {
@@ -147,11 +141,10 @@ class Audit {
   /// entries.
   PostureNumbers numbers(const JointVector& q) const;
 
-  /// Computes the numbers of another closed loop with the same springs at q, such as that of a
+  /// Computes the numbers of another loop with the same springs at q, such as that of a
   /// PostureLoop, from its mass, damping and stiffness factor. Returns none where numbers(q) would
   /// leave it to audit().
-  std::optional<PostureNumbers> numbers(const JointVector& q,
-                                        const analysis::System<kMaxJoints>& loop) const;
+  std::optional<PostureNumbers> numbers(const LoopAt& loop) const;
 
   /// Computes modes and numbers at q with proved bounds. Throws like numbers(), and
   /// std::runtime_error if the eigenvalue iteration fails.
@@ -181,8 +174,8 @@ class Audit {
   /// Throws like numbers().
   analysis::TaskImpedance undamped(const JointVector& q) const;
 
-  /// Returns the sampled loop at q, with the joints' friction and the integral of the springs, in
-  /// joint coordinates.
+  /// Returns the sampled loop at q, of SampledArm::at with the integral of the springs, in joint
+  /// coordinates.
   /// Throws like numbers(), and std::invalid_argument without a period.
   analysis::SampledLoop loop(const JointVector& q) const;
 
@@ -192,26 +185,23 @@ class Audit {
 
  private:
   DynamicsResult evaluate(const JointVector& q) const;
-  std::optional<PostureNumbers> numbers(const DynamicsResult& robot,
-                                        const analysis::System<kMaxJoints>& system) const;
+  std::optional<PostureNumbers> numbers(
+      const analysis::System<kMaxJoints>& system,
+      const std::function<analysis::SampledLoop()>& sampled) const;
+  analysis::SampledLoop loop(const JointVector& q, const DynamicsResult& robot) const;
   bool kinematic() const noexcept { return options_.kinematic_null_space; }
   /// Returns the closed loop, with elastic joints where there are some.
   analysis::System<> system_of(const analysis::TaskImpedance& impedance) const;
   /// Returns the springs and dampers that act at a posture.
   Impedance impedance_at(const DynamicsResult& robot) const;
-  /// Returns the sampled loop at a posture, with the integral of these springs.
-  analysis::SampledLoop loop_at(const DynamicsResult& robot, const Impedance& impedance) const;
   /// Returns the same as matrices of an impedance whose errors are counted.
   analysis::TaskImpedance task_impedance(const DynamicsResult& robot) const;
 
   RobotModel model_;
   AuditOptions options_;
-  DynamicsKernel kernel_;
-  analysis::Gears elastic_;
-  JointVector friction_;
+  SampledArm arm_;
   Impedance impedance_;  ///< in 1/s^2 and 1/s with inertia_blocks
-  analysis::SampledLoop loop_;
-  int springs_ = 0;  ///< modes where no posture is singular
+  int springs_ = 0;      ///< modes where no posture is singular
 };
 
 /// Summarizes postures by their `numbers`; posture(i) returns the i-th posture. The numbers in the

@@ -1,5 +1,4 @@
 #pragma once
-#include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 
 #include <string>
@@ -10,9 +9,7 @@ namespace dashpot::controller {
 /// Limits::gain_margin. The loop has a zero-order hold, delay and filters (Analysis::Sampled),
 /// and the integral of the springs; what compensates friction at the measured velocity counts as
 /// damping taken away. The margin is that of analysis::gain_margin at one posture at rest, in both
-/// modes. Motions slower than 1 rad/s do not count. Gravity compensation with a zero-order hold
-/// feeds motions without springs, which then grow that slowly, so that otherwise all gains would be
-/// refused.
+/// modes. Motions slower than kSlowestVibration do not count.
 ///
 /// Damping that is designed for a ratio grows with the payload told, whether the arm carries it or
 /// not. So in a mode with a ratio the same springs and dampers are judged on the arm without
@@ -39,7 +36,6 @@ class GainJudge {
   /// Attaches something else to the tip link.
   void attach(const Attachment& attachment) noexcept {
     attached_ = attachment;
-    kernel_.attach(attachment);
     posture_loop_.attach(attachment);
     loaded_ = attachment.mass > 0;
   }
@@ -57,20 +53,11 @@ class GainJudge {
   std::string missing(const Verdict& verdict, const Gains& gains) const;
 
  private:
-  /// Returns the margin of a closed loop with this gravity gradient, at most `enough`; 0 if it
-  /// cannot be analysed.
-  double margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,
-                double enough);
-  Eigen::MatrixXd gravity_of(const DynamicsKernel& kernel, const JointVector& q) const;
-
   RobotModel model_;
   Settings settings_;
   Attachment attached_;
-  DynamicsKernel kernel_;
-  DynamicsKernel bare_;  ///< without payload
-  bool loaded_;          ///< there is a payload
-  analysis::SampledLoop loop_;
-  analysis::Gears elastic_;
+  bool loaded_;      ///< there is a payload
+  SampledArm bare_;  ///< without payload
   PostureLoop posture_loop_;
 };
 

@@ -1,22 +1,106 @@
 #pragma once
-#include <dashpot/analysis/system.hpp>
+#include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/tick_status.hpp>
 
+#include <string>
+#include <vector>
+
 namespace dashpot::controller {
 
-/// The closed loop that gains make at any posture, with the robot at rest there, without a loop
-/// that runs: the matrices that Controller::closed_loop gives once the gains are in force.
-class PostureLoop {
+/// When the torques of a controller act on an arm, and what of the past they count. What is left
+/// out, and what a model does not know, is said by loop_assumptions.
+struct LoopTiming {
+  double period = 0;  ///< of the control loop, s; zero: the loop is taken for continuous
+  int delay = 0;      ///< ticks from a torque to its effect, beyond the hold
+  double cutoff = 0;  ///< of a first-order low-pass on the torque, Hz; 0: none
+  bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / period as velocity
+  /// Time of the integral of the springs of task or joints, s: their pull adds up to a torque or
+  /// wrench that grows by pull / integral_time (see Integral::time). 0: none.
+  double integral_time = 0;
+  /// False: the torque against gravity comes as late as all torque. True: gravity is compensated
+  /// without delay, such as by the robot itself.
+  bool ideal_gravity = false;
+};
+
+/// Returns the timing that settings describe. Gravity that the controller does not compensate is
+/// left to the robot, without delay.
+LoopTiming timing_of(const Settings& settings);
+
+/// Returns the loop with this timing, without its gravity where that is ideal.
+analysis::SampledLoop timed(const LoopTiming& timing, analysis::SampledLoop loop);
+
+/// Returns what a closed loop leaves out that an arm may have, in the short names that
+/// docs/concepts.md explains: "gravity ideal", "rotors unknown". In all commands the same.
+/// `model` is null where only matrices are known.
+std::vector<std::string> loop_assumptions(const LoopTiming& timing, const RobotModel* model);
+
+/// Motions slower than this, rad/s, do not count in a gain margin, because a self-motion fed by the
+/// compensation of gravity through a zero-order hold is no vibration.
+inline constexpr double kSlowestVibration = 1;
+
+/// Returns dg/dq (n x n, N m/rad) of the gravity torque g(q), by central differences, with a
+/// relative error of 1e-9. Allocates.
+Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector& q);
+
+/// Returns the integral of springs with this K_I (n x n, N m/(rad s), symmetric positive
+/// semidefinite; see integral_stiffness) as states of the loop, as many as its rank: with K_I = F
+/// F',
+///     w_k+1 = w_k + T F' q_k,   and the torque -F w_k.
+/// None if K_I has no entries.
+analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period);
+
+/// An arm as a sampled loop has it: all of the loop but the springs and dampers of the controller.
+class SampledArm {
  public:
-  /// Copies the model. The settings have to be valid. Limits, but the gain margin, and `analysis`,
-  /// but the sampled loop's delays, are not looked at.
-  PostureLoop(const RobotModel& model, const Settings& settings);
+  SampledArm(const RobotModel& model, const LoopTiming& timing);
 
   /// Attaches something else to the tip link.
   void attach(const Attachment& attachment) noexcept { kernel_.attach(attachment); }
+  const DynamicsKernel& kernel() const noexcept { return kernel_; }
+  const LoopTiming& timing() const noexcept { return timing_; }
+  const analysis::Gears& gears() const noexcept { return gears_; }
+  const JointVector& friction() const noexcept { return friction_; }  ///< viscous, n, N m s/rad
+
+  /// Returns the loop at the posture `q` (n, rad), in joint coordinates, with what the world adds,
+  /// and with the integral of the springs, see integral_stiffness.
+  analysis::SampledLoop at(const JointVector& q, const PassivePart* outside = nullptr,
+                           const JointMatrix& K_I = {}) const;
+
+ private:
+  DynamicsKernel kernel_;
+  LoopTiming timing_;
+  analysis::Gears gears_;
+  JointVector friction_;
+};
+
+/// Returns a system whose size is not bounded by the type.
+analysis::System<> unbounded(const analysis::System<kMaxJoints>& system);
+
+/// A loop at a posture, in the coordinates of its gears: M q'' + C q' + K q = f, and how it is
+/// sampled.
+struct LoopAt {
+  analysis::System<> system;
+  analysis::SampledLoop sampled;
+};
+
+/// Returns the gain margin of a loop, at most `enough`; 0 if it cannot be analysed.
+double margin_up_to(const analysis::System<kMaxJoints>& system, const analysis::SampledLoop& loop,
+                    double enough);
+
+/// The closed loop that gains make at any posture, with the robot at rest there, without a loop
+/// that runs: the matrices that Controller::closed_loop gives once the gains are in force, and how
+/// the settings have it sampled.
+class PostureLoop {
+ public:
+  /// Copies the model. The settings have to be valid. Limits, but the gain margin, and of
+  /// `analysis` all but the sampled loop are not looked at.
+  PostureLoop(const RobotModel& model, const Settings& settings);
+
+  /// Attaches something else to the tip link.
+  void attach(const Attachment& attachment) noexcept { arm_.attach(attachment); }
   /// Sets `system` to M q'' + C q' + K q = f at the posture `q` (n, rad), in joint coordinates, or
   /// those of analysis::Gears: mass, damping, stiffness and its factor, as Controller::closed_loop.
   /// The gains must have passed check_gains in this mode. The springs hold `external_wrench` (6, in
@@ -26,16 +110,25 @@ class PostureLoop {
   Status closed_loop(const JointVector& q, const Gains& gains, Mode mode,
                      analysis::System<kMaxJoints>& system,
                      const Vector6& external_wrench = Vector6::Zero());
+  /// Returns how the last closed_loop is sampled, in its coordinates.
+  analysis::SampledLoop sampled() const;
+  /// Returns both. Throws std::invalid_argument where closed_loop fails.
+  LoopAt at(const JointVector& q, const Gains& gains, Mode mode,
+            const Vector6& external_wrench = Vector6::Zero());
   /// Returns what the sampled loop leaves of the ratios of the last closed_loop.
   const analysis::DampingLevel& level() const noexcept { return level_; }
+  const SampledArm& arm() const noexcept { return arm_; }
 
  private:
-  DynamicsKernel kernel_;
-  analysis::Gears elastic_;
+  SampledArm arm_;
   Settings settings_;
   JointVector friction_left_;
   DesignedDamping damping_;
+  // Of the last closed_loop:
   analysis::DampingLevel level_;
+  JointVector q_;
+  PassivePart outside_;
+  JointMatrix integral_;
 };
 
 }  // namespace dashpot::controller

@@ -148,8 +148,8 @@ double boundary(const ScaledLoop& loop, Trial inside, Trial outside) {
   }
 }
 
-bool keeps(const SampledDataModel& unit, double margin) {
-  const ScaledLoop loop(unit, 0);
+bool keeps(const SampledDataModel& unit, double margin, double slowest) {
+  const ScaledLoop loop(unit, slowest);
   // Also where it is not stable with less: gain_margin begins at 1.
   if (margin < 1) return loop.excess(margin) < 0 || loop.excess(1) < 0;
   if (!(loop.excess(margin) < 0)) return false;
@@ -186,18 +186,17 @@ double find_margin(const SampledDataModel& unit, double most, double slowest) {
 
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
-                   double most, double slowest) {
+                   double most) {
   if (loop.gears.any()) {
     const GearedLoop geared(system, loop);
-    return gain_margin(geared.system, geared.spectrum, geared.loop, most, slowest);
+    return gain_margin(geared.system, geared.spectrum, geared.loop, most);
   }
-  return find_margin(SampledDataModel(system, spectrum, loop), most, slowest * loop.period);
+  return find_margin(SampledDataModel(system, spectrum, loop), most, loop.slowest * loop.period);
 }
 
 template <int N>
-double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double most,
-                   double slowest) {
-  return find_margin(SampledDataModel(form, loop), most, slowest * loop.period);
+double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double most) {
+  return find_margin(SampledDataModel(form, loop), most, loop.slowest * loop.period);
 }
 
 bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
@@ -208,14 +207,14 @@ bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const Samp
     return keeps_margin(geared.system, geared.spectrum, geared.loop, margin);
   }
   const SampledDataModel unit(system, spectrum, loop);
-  return margin == 0 || keeps(unit, margin);
+  return margin == 0 || keeps(unit, margin, loop.slowest * loop.period);
 }
 
 template double gain_margin(const System<kDynamic>&, const Spectrum<kDynamic>&, const SampledLoop&,
-                            double, double);
+                            double);
 template double gain_margin(const System<kMaxDof>&, const Spectrum<kMaxDof>&, const SampledLoop&,
-                            double, double);
-template double gain_margin(const ElasticForm<kDynamic>&, const SampledLoop&, double, double);
-template double gain_margin(const ElasticForm<kMaxDof>&, const SampledLoop&, double, double);
+                            double);
+template double gain_margin(const ElasticForm<kDynamic>&, const SampledLoop&, double);
+template double gain_margin(const ElasticForm<kMaxDof>&, const SampledLoop&, double);
 
 }  // namespace dashpot::analysis

@@ -1,6 +1,5 @@
 #include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
-#include <dashpot/analysis/linalg/phi_functions.hpp>
 #include <dashpot/analysis/sampled/sampled_data_model.hpp>
 
 #include <Eigen/Cholesky>
@@ -192,11 +191,11 @@ void SampledDataModel::integrate() {
     motion << MatrixXd::Identity(n, n), one, two, MatrixXd::Zero(n, n), zero, one;
     return;
   }
-  // d/dt (y, y', f) = rate (y, y', f)
-  MatrixXd rate = MatrixXd::Zero(3 * n, 3 * n);
+  MatrixXd rate = MatrixXd::Zero(2 * n, 2 * n);  // of (y, y')
   rate.block(0, n, n, n).setIdentity();
-  rate.middleRows(n, n) << -G, -D, MatrixXd::Identity(n, n);
-  motion = phi(0, rate, 1).real().topRows(2 * n);
+  rate.bottomRows(n) << -G, -D;
+  const auto [zero, one, two] = real_phi(rate);
+  motion << zero, one.rightCols(n);
 }
 
 void SampledDataModel::span_commands() {

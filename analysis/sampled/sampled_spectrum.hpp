@@ -35,6 +35,9 @@ struct SampledLoop {
   /// a contact. Empty: none.
   Eigen::MatrixXd passive_stiffness = {};
   ControllerMemory memory = {};  ///< m = 0: none
+  /// Motions slower than this, rad/s, do not count in a gain margin. A self-motion that the
+  /// compensation of gravity feeds through the hold and the delay grows that slowly.
+  double slowest = 0;
   /// Gears that bend. The system and all of the above are then those in joint coordinates, friction
   /// is the gears' and acts on the motors' side, and the modes are those of Gears::extend. An
   /// elastic form with gears has to have been extended already, see with_gears.

@@ -167,9 +167,7 @@ void check(const AuditCommand& command) {
     throw InputError("--mode", "goes with --gains");
   }
   command.postures.check();
-  const analysis::SampledLoop& loop = command.loop;
-  if (command.period == 0 && (loop.delay > 0 || loop.torque_cutoff > 0 ||
-                              loop.difference_velocity || command.integral_time > 0)) {
+  if (command.timing.period == 0 && given(command.timing)) {
     throw InputError(
         "--period",
         "missing; --delay, --cutoff, --difference-velocity and --integral-time need it");
@@ -192,12 +190,9 @@ AuditTask read_task(const AuditCommand& command) {
   task.drives = arm.drives;
   AuditOptions& audit = task.options;
   read_gains(command, task.model, audit, task.intended_ratio);
-  audit.period = command.no_margin ? 0 : command.period;
-  audit.delay = command.loop.delay;
-  audit.cutoff = command.loop.torque_cutoff;
-  audit.difference_velocity = command.loop.difference_velocity;
+  static_cast<controller::LoopTiming&>(audit) = command.timing;
+  if (command.no_margin) audit.period = 0;
   audit.margin = command.margin;
-  audit.integral_time = command.integral_time;
   const double intended = std::isnan(task.intended_ratio) ? 0.7 : task.intended_ratio;
   task.wanted_ratio = command.damping_ratio.value_or(intended);
   task.q = arm.posture.read(task.model);
@@ -242,10 +237,12 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
       "dynamic|kinematic (dynamic)")
       ->check(CLI::IsMember({"dynamic", "kinematic"}));
   add_model_options(command, arm);
-  command.add_option("--period", options.period, "Of the control loop: computes the gain margin")
+  command
+      .add_option("--period", options.timing.period,
+                  "Of the control loop: computes the gain margin")
       ->transform(control_period())
       ->option_text("S");
-  add_loop_options(command, options.loop, options.integral_time);
+  add_loop_options(command, options.timing);
   command.add_option("--margin", options.margin, "Gain margin that is asked for")
       ->transform(quantity("", 1, 1e6, "a factor of at least 1"))
       ->option_text("G (2)");

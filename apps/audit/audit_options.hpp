@@ -19,9 +19,7 @@ struct AuditCommand {
   std::string null_projector;
   std::optional<double> damping_factor;
   std::string rotation, frame;
-  double period = 0;           ///< s
-  analysis::SampledLoop loop;  ///< but for the period and the integral
-  double integral_time = 0;    ///< s; 0: no integral
+  controller::LoopTiming timing;
   bool no_margin = false;
   double margin = 2;
   PosturesOption postures;

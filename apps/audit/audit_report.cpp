@@ -110,6 +110,7 @@ std::string posture_table(const AuditTask& task, const AuditReport& report) {
             format_number(task.options.period, 3) +
             " s: " + margin_verdict(task, numbers.gain_margin);
   }
+  text += assumes_text(loop_assumptions(task.options, &task.model));
   text += integral_text(posture.integral_decays);
   const Eigen::Index zero = posture.spectrum.zero_modes.count;
   text += "  Zero modes: " + std::to_string(zero) + ".";
@@ -206,6 +207,7 @@ std::string audit_json(const AuditTask& task, const AuditReport& report) {
                    {"fastest_pole", numbers.fastest_pole},
                    {"fastest_pole_bound", report.posture.fastest_pole_bound},
                    {"gain_margin", numbers.gain_margin},
+                   {"assumes", loop_assumptions(task.options, &task.model)},
                    {"integral_decays", report.posture.integral_decays},
                    {"zero_modes", numbers.zero_modes},
                    {"singular", numbers.singular},

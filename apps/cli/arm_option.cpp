@@ -4,7 +4,6 @@
 #include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/rotors.hpp>
 
 #include <Eigen/Core>
@@ -150,12 +149,8 @@ SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
     entry.impedance.jacobian = dynamics.J;
     entry.impedance.task_stiffness = Eigen::MatrixXd(stiffness->asDiagonal());
   }
-  const Eigen::VectorXd friction = model.joint_values(&controller::Joint::viscous_friction);
-  if (!friction.isZero(0)) {
-    entry.friction = friction.asDiagonal();
-    entry.impedance.damping = entry.friction;
-  }
-  entry.gears = controller::elastic_joints(model);
+  entry.loop = controller::SampledArm(model, {}).at(q);
+  if (entry.loop.friction.size() > 0) entry.impedance.damping = entry.loop.friction;
   if (const auto null =
           per_joint("--null-damping", options.null_damping, model, "N m s/rad", "N s/m")) {
     entry.add_null_damping(Eigen::MatrixXd(null->asDiagonal()));
@@ -178,18 +173,28 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
   add_accept_inertias(command, arm.accept_inertias);
 }
 
-void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time) {
-  command.add_option("--delay", loop.delay, "Ticks from a command to its effect, beyond the hold")
+void add_loop_options(CLI::App& command, controller::LoopTiming& timing) {
+  command
+      .add_option("--delay", timing.delay, "Ticks from a command to its effect, beyond the hold")
       ->check(CLI::Range(0, 100))
       ->option_text("N (0)");
-  command.add_option("--cutoff", loop.torque_cutoff, "Of a low-pass on the torque; 0: none")
+  command.add_option("--cutoff", timing.cutoff, "Of a low-pass on the torque; 0: none")
       ->transform(quantity("Hz", 0, std::numeric_limits<double>::max(), "a frequency in Hz"))
       ->option_text("HZ (0)");
-  command.add_flag("--difference-velocity", loop.difference_velocity,
+  command.add_flag("--difference-velocity", timing.difference_velocity,
                    "The controller takes velocities from positions");
-  command.add_option("--integral-time", integral_time, "Of the integral of the springs; 0: none")
+  command
+      .add_option("--integral-time", timing.integral_time,
+                  "Of the integral of the springs; 0: none")
       ->transform(quantity("s", 0, std::numeric_limits<double>::max(), "a time in s"))
       ->option_text("S (0)");
+  command.add_flag("--ideal-gravity", timing.ideal_gravity,
+                   "Gravity is compensated without delay, such as by the robot itself");
+}
+
+bool given(const controller::LoopTiming& timing) {
+  return timing.delay > 0 || timing.cutoff > 0 || timing.difference_velocity ||
+         timing.integral_time > 0 || timing.ideal_gravity;
 }
 
 }  // namespace dashpot::apps

@@ -1,8 +1,8 @@
 #pragma once
-#include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/robot_model.hpp>
 
 #include <CLI/App.hpp>
@@ -54,8 +54,8 @@ SystemEntry read_arm(const ArmOptions& options, const controller::RobotModel& mo
 /// Adds the options of the arm's inertia and friction: reflected inertia, payload and so on.
 void add_model_options(CLI::App& command, ArmOptions& arm);
 
-/// Adds those of the loop but for its period: delay, low-pass, differenced velocity, and the time
-/// of the integral of the springs, s.
-void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time);
+/// Adds the options of a loop but for its period. `given` tells whether one of them was.
+void add_loop_options(CLI::App& command, controller::LoopTiming& timing);
+bool given(const controller::LoopTiming& timing);
 
 }  // namespace dashpot::apps

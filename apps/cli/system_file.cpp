@@ -94,7 +94,7 @@ void read_gears(const YamlMapping& keys, SystemEntry& entry) {
       keys, "position_sensor",
       std::array<std::pair<std::string_view, bool>, 2>{{{"motor", false}, {"link", true}}}, link);
   try {
-    entry.gears = analysis::Gears({stiffness, damping, *inertia, entry.friction, link});
+    entry.loop.gears = analysis::Gears({stiffness, damping, *inertia, entry.loop.friction, link});
   } catch (const std::invalid_argument& error) {
     throw keys.error("gear_stiffness", error.what());
   }
@@ -105,7 +105,7 @@ void read_gears(const YamlMapping& keys, SystemEntry& entry) {
 void read_additions(const YamlMapping& keys, SystemEntry& entry) {
   analysis::TaskImpedance& impedance = entry.impedance;
   const Eigen::Index n = impedance.mass.rows();
-  if (impedance.damping) entry.friction = *impedance.damping;
+  if (impedance.damping) entry.loop.friction = *impedance.damping;
   const bool square = impedance.mass.cols() == n;
   if (const auto inertia = per_joint(keys, "reflected_inertia", n); inertia && square) {
     add(inertia->asDiagonal(), Eigen::MatrixXd::Zero(n, n), impedance.mass, impedance.mass_error);
@@ -165,7 +165,7 @@ SystemEntry read_entry(const YamlNode& node, const std::string& prefix) {
   entry.impulse = joint_vector(keys, "impulse", n);
   entry.force = joint_vector(keys, "force", n);
   entry.times = keys.vector("times");
-  if (entry.times && entry.gears.any()) {
+  if (entry.times && entry.loop.gears.any()) {
     throw keys.error("times", "does not go with gear_stiffness");
   }
   if (entry.times) {
@@ -182,7 +182,7 @@ SystemEntry read_entry(const YamlNode& node, const std::string& prefix) {
 
 analysis::System<> SystemEntry::system(const analysis::TaskImpedance& given) const {
   analysis::System<> result = analysis::to_joint_space(given);
-  if (gears.any()) gears.extend(result);
+  if (loop.gears.any()) loop.gears.extend(result);
   return result;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/gears.hpp>
+#include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/yaml/yaml_document.hpp>
@@ -19,9 +19,9 @@ using controller::InputError;
 /// n entries; analysis::to_joint_space checks the matrices.
 struct SystemEntry {
   analysis::TaskImpedance impedance;  ///< with all that the keys add
-  /// The part of its damping that the joints supply themselves, n x n; none if empty.
-  Eigen::MatrixXd friction;
-  analysis::Gears gears;  ///< of elastic joints, with `friction`; none if there are none
+  /// What the robot has of a sampled loop: its friction, which is a part of the damping, its gears,
+  /// and of an arm the gravity that is compensated.
+  analysis::SampledLoop loop;
   std::optional<Eigen::VectorXd> initial_position;  ///< q(0), n
   std::optional<Eigen::VectorXd> initial_velocity;  ///< q'(0), n
   std::optional<Eigen::VectorXd> impulse;           ///< at t = 0, n

@@ -9,7 +9,6 @@
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/rotors.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -43,19 +42,24 @@ struct Found {
   std::optional<LoopReport> loop;
 };
 
-/// The loop of the options, with the joints' friction and the integral of one system.
+/// The loop of the options, with what the robot has of it and the integral of one system.
 analysis::LoopLimit limit_of(const SystemEntry& entry, const DesignOptions& options) {
   const analysis::TaskImpedance& given = entry.impedance;
-  analysis::LoopLimit limit = options.limit;
-  limit.loop.period = *options.period;
-  limit.loop.friction = entry.friction;
-  limit.loop.gears = entry.gears;
-  if (options.integral_time > 0) {
+  analysis::LoopLimit limit{controller::timed(options.timing, entry.loop), options.margin};
+  if (const double time = options.timing.integral_time; time > 0) {
     analysis::to_joint_space(given);  // throws for wrong sizes
-    limit.loop.memory = controller::integral_memory(
-        controlled_stiffness(given) / options.integral_time, *options.period);
+    limit.loop.memory =
+        controller::integral_memory(controlled_stiffness(given) / time, limit.loop.period);
   }
   return limit;
+}
+
+/// What is left out of that loop. Of matrices no gravity is known.
+std::vector<std::string> assumed(const DesignOptions& options,
+                                 const std::optional<controller::RobotModel>& model) {
+  controller::LoopTiming timing = options.timing;
+  timing.ideal_gravity = timing.ideal_gravity || !model;
+  return controller::loop_assumptions(timing, model ? &*model : nullptr);
 }
 
 /// Says that a gain margin cannot be kept: "NO ... keeps a gain margin of ..."
@@ -64,8 +68,7 @@ std::runtime_error lost_margin(const std::string& none, const DesignOptions& opt
   const std::string reason =
       largest > 0 ? "largest margin is " + format_number(largest, 3) + ", with " + with
                   : "loop is unstable however little of the gains is left";
-  return std::runtime_error(none + " keeps a gain margin of " +
-                            format_number(options.limit.gain_margin, 3) +
+  return std::runtime_error(none + " keeps a gain margin of " + format_number(options.margin, 3) +
                             " with this period and delay; the " + reason);
 }
 
@@ -77,7 +80,8 @@ Found design_one(const SystemEntry& entry, const DesignOptions& options) {
   }
   const auto start = options.near ? given.task_damping : std::nullopt;
   const analysis::DampingTarget target = options.target();
-  if (!options.period) return {analysis::design_damping(given, target, structure, start), {}};
+  if (options.timing.period == 0)
+    return {analysis::design_damping(given, target, structure, start), {}};
   const analysis::LoopLimit limit = limit_of(entry, options);
   analysis::SampledDamping found = analysis::design_damping(given, target, limit, structure, start);
   if (!found.kept) {
@@ -107,9 +111,9 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
   report.before = make_report(plain, entry.system(entry.impedance), spectrum, largest);
   plain.impedance = report.impedance;
   analysis::System<> after = report.design.system;
-  if (entry.gears.any()) entry.gears.extend(after);
+  if (entry.loop.gears.any()) entry.loop.gears.extend(after);
   report.after = make_report(plain, after, spectrum, largest);
-  report.gears = entry.gears.any();
+  report.gears = entry.loop.gears.any();
   if (report.gears) {
     if (options.sensitivity) throw InputError("--sensitivity", "does not go with gears that bend");
     report.notes.emplace_back(
@@ -136,8 +140,8 @@ std::string rotors_note(const DesignOptions& options, const controller::RobotMod
                         const controller::JointVector& q, bool lowered) {
   std::string note = controller::missing_rotors_text(model);
   if (note.empty()) return "";
-  note += options.period ? ": fast modes, and what the loop bears, are those"
-                         : ": fast modes are those";
+  note += options.timing.period > 0 ? ": fast modes, and what the loop bears, are those"
+                                    : ": fast modes are those";
   note += " of " + controller::arm_without_rotors(model) + ". ";
   if (lowered) {
     if (const controller::Drives* published = controller::unknown_rotors(model).published) {
@@ -155,7 +159,8 @@ std::string rotors_note(const DesignOptions& options, const controller::RobotMod
     const analysis::DampingDesign wanted = analysis::design_damping(
         read_arm(options.arm, model, q).impedance, options.target(), options.damping_structure());
     const auto enough = controller::enough_reflected_inertia(
-        model, wanted.system, *options.period, [&](const controller::RobotModel& with_rotors) {
+        model, wanted.system, options.timing.period,
+        [&](const controller::RobotModel& with_rotors) {
           const Found found = design_one(read_arm(options.arm, with_rotors, q), options);
           return found.loop->level == 1;
         });
@@ -184,7 +189,7 @@ DesignReport report_on_arm(const DesignOptions& options, const SystemEntry& entr
   } catch (const InputError&) {
     throw;
   } catch (const std::runtime_error& error) {  // the margin is lost
-    const std::string note = rotors_note(options, model, q, options.period.has_value());
+    const std::string note = rotors_note(options, model, q, options.timing.period > 0);
     throw std::runtime_error(error.what() + (note.empty() ? "" : "; " + note));
   }
 }
@@ -222,8 +227,8 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
     }
     show_progress(done);
   };
-  region.gain_margin = options.limit.gain_margin;
-  if (options.period) {
+  region.gain_margin = options.margin;
+  if (options.timing.period > 0) {
     region.loop = [&](std::size_t i) { return limit_of(file.entries[i], options).loop; };
   }
   try {
@@ -235,7 +240,7 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
                         "a share of " + format_number(design.share, 3) + ", at configuration [" +
                             std::to_string(design.margin_sample) + "]");
     }
-    if (options.period) report.limit = limit_of(file.entries[0], options);
+    if (options.timing.period > 0) report.limit = limit_of(file.entries[0], options);
     return report;
   } catch (const analysis::InvalidSystem&) {
     for (const SystemEntry& entry : file.entries) report_on(entry, options);  // names the entry
@@ -276,6 +281,7 @@ void run_design(const DesignOptions& options, OutputFile& csv) try {
   if (options.region) {
     RegionReport report = report_on_region(file, options);
     report.postures = std::move(postures);
+    report.assumes = assumed(options, model);
     if (csv) csv.write(region_csv(report));
     csv.finish();
     print(options.json ? region_json(report) : region_table(report));
@@ -287,6 +293,7 @@ void run_design(const DesignOptions& options, OutputFile& csv) try {
   const auto each = [&](const SystemEntry& entry) {
     reports.push_back(model ? report_on_arm(options, entry, *model, postures[0])
                             : report_on(entry, options));
+    reports.back().assumes = assumed(options, model);
   };
   const std::string interrupted = for_each_shown(file.entries, each, "systems");
   print(options.json ? design_json(reports, file.is_list) : design_table(reports, file.is_list));

@@ -40,15 +40,14 @@ void add_arm(CLI::App& command, ArmOptions& arm) {
 }
 
 void add_loop(CLI::App& command, DesignOptions& options) {
-  analysis::SampledLoop& loop = options.limit.loop;
   command
-      .add_option("--period", options.period,
+      .add_option("--period", options.timing.period,
                   "Of the control loop: propose only what it bears sampled and held")
       ->transform(control_period())
       ->option_text("S");
-  add_loop_options(command, loop, options.integral_time);
+  add_loop_options(command, options.timing);
   command
-      .add_option("--margin", options.limit.gain_margin,
+      .add_option("--margin", options.margin,
                   "Springs and damping may grow by this factor together")
       ->transform(quantity("", 1, kLargest, "a factor of at least 1"))
       ->option_text("G (2)");
@@ -136,11 +135,7 @@ void check(const DesignOptions& options) {
     throw InputError("--largest-ratio", "is below --damping-ratio");
   }
   if (!options.csv.empty() && !options.region) throw InputError("--csv", "needs --region");
-  const analysis::LoopLimit& limit = options.limit;
-  const bool loop = limit.loop.delay > 0 || limit.loop.torque_cutoff > 0 ||
-                    limit.loop.difference_velocity || options.integral_time > 0 ||
-                    limit.gain_margin != 2;
-  if (!options.period && loop) {
+  if (options.timing.period == 0 && (given(options.timing) || options.margin != 2)) {
     throw InputError("--period",
                      "missing; --delay, --cutoff, --integral-time and --margin need it");
   }

@@ -16,9 +16,8 @@ struct DesignOptions {
   double ratio = 0;
   std::string structure = "full";
   double soft_frequency = analysis::DampingTarget().soft_frequency;  ///< rad/s
-  std::optional<double> period;  ///< s; none: the loop is taken for continuous
-  analysis::LoopLimit limit;     ///< but for the period and the integral
-  double integral_time = 0;      ///< s; 0: no integral
+  controller::LoopTiming timing;
+  double margin = 2;  ///< of gain, where there is a period
   std::optional<double> largest_ratio;
   int threads = 0;
   std::string csv;  ///< where the map of the region goes; nowhere if empty

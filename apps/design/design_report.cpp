@@ -65,6 +65,7 @@ Json to_value(const DesignReport& report) {
                  {"misses", misses},
                  {"indefinite_by", report.design.indefinite_by},
                  {"notes", report.notes},
+                 {"assumes", report.assumes},
                  {"modes", after["modes"]},
                  {"before", before},
                  {"after", after}};
@@ -283,7 +284,7 @@ std::string design_table(const std::vector<DesignReport>& reports, bool as_list)
             matrix_text(report.design.damping) + "\n";
     for (const std::string& note : report.notes) text += note_lines(note);
     if (report.loop) {
-      text += loop_text(report);
+      text += loop_text(report) + assumes_text(report.assumes);
       text += integral_text(
           controller::integral_decays(report.loop->sampled, report.loop->limit.loop.period));
     }
@@ -301,7 +302,8 @@ std::string region_json(const RegionReport& report) {
                  {"wanted", report.ratio},
                  {"level", design.level},
                  {"violation", design.violation},
-                 {"worst_sample", design.worst_sample}};
+                 {"worst_sample", design.worst_sample},
+                 {"assumes", report.assumes}};
   if (report.limit) {
     result["loop"] = limit_value(*report.limit, design.gain_margin);
     result["loop"]["share"] = design.share;
@@ -335,6 +337,7 @@ std::string region_table(const RegionReport& report) {
   } else if (report.limit) {
     text += loop_margin_text(design.gain_margin);
   }
+  if (report.limit) text += assumes_text(report.assumes);
   return text + "\n" + table_of(rows_of(report), region_fields(report));
 }
 

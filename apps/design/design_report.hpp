@@ -28,7 +28,7 @@ struct DesignReport {
   Report after;
   std::vector<analysis::ModeSensitivity> sensitivities;  ///< of `after`; none if not asked for
   std::optional<LoopReport> loop;  ///< none if the loop is taken for continuous
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, assumes;
   std::optional<Eigen::VectorXd> q;  ///< of an arm, rad or m
   std::string rotors;                ///< of an arm: "known" or "unknown"
   std::string drives;                ///< name of the published drives that it has; empty: none
@@ -40,6 +40,7 @@ struct RegionReport {
   std::string key;
   double ratio = 0;
   analysis::RegionDesign design;
+  std::vector<std::string> assumes = {};
   std::vector<controller::JointVector> postures = {};  ///< of an arm, one for each sample
   std::optional<analysis::LoopLimit> limit = {};  ///< none if the loops are taken for continuous
 };

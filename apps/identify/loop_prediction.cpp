@@ -4,7 +4,7 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/posture_loop.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
+#include <dashpot/controller/vibration/closed_loop.hpp>
 
 #include <yaml-cpp/yaml.h>
 #include <algorithm>
@@ -86,47 +86,30 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
   controller::RobotDescription rigid = config_.robot;  // what the controller feeds back
   rigid.options.gear_stiffness.resize(0);
   const bool elastic = config_.model.elastic_joints() > 0;
-  controller::PostureLoop loop(elastic ? rigid.model() : config_.model, settings);
-  analysis::System<controller::kMaxJoints> believed;
-  const controller::Status status =
-      loop.closed_loop(q, settings.initial.gains, settings.initial.mode, believed);
-  if (status != controller::Status::kOk) {
-    throw InputError("--against",
-                     std::string("no prediction at this posture: ") + controller::to_text(status));
-  }
-  const controller::RobotModel arm = corrected(config_, correction).model();
-  const auto at = controller::evaluate(arm, q, JointVector::Zero(q.size()));
-  analysis::System<> system(q.size());
+  controller::PostureLoop believed(elastic ? rigid.model() : config_.model, settings);
+  analysis::System<> system = believed.at(q, settings.initial.gains, settings.initial.mode).system;
+  const controller::RobotModel model = corrected(config_, correction).model();
+  controller::LoopTiming timing = controller::timing_of(settings);
+  timing.delay = delay;
+  const controller::SampledArm arm(model, timing);
+  const auto at = controller::evaluate(model, q, JointVector::Zero(q.size()));
   system.mass = at.M;
-  system.damping = believed.damping;
-  system.stiffness = believed.stiffness;
-  system.stiffness_factor = believed.stiffness_factor;
-  analysis::SampledLoop sampled = controller::sampled_loop(arm, settings);
-  sampled.delay = delay;
-  system.damping += sampled.friction;
-  system.damping.diagonal() -= joint_friction(config_);
+  system.damping.diagonal() += arm.friction() - joint_friction(config_);
   const controller::PassivePart outside = controller::passive_part(
       at.J, settings.environment, controller::JointMatrix::Zero(q.size(), q.size()));
-  sampled.friction += outside.damping;
-  sampled.passive_stiffness = outside.stiffness;
   const controller::Impedance springs(settings.initial, static_cast<int>(q.size()));
-  sampled.memory = controller::integral_memory(at, springs, settings.integral.time, sampled.period);
-  if (settings.feed_forward.gravity) {
-    const MatrixXd gravity = controller::gravity_gradient(controller::DynamicsKernel(arm), q);
-    sampled.gravity_gradient = gravity;
-    if (correction.payload != 0 || !correction.center.isZero(0)) {  // whose weight nobody holds
-      const MatrixXd added =
-          gravity - controller::gravity_gradient(controller::DynamicsKernel(config_.model), q);
-      system.stiffness += (added + added.transpose()) / 2;
-      system.stiffness_factor.resize(0, q.size());
-    }
+  analysis::SampledLoop sampled =
+      arm.at(q, &outside, controller::integral_stiffness(at, springs, timing.integral_time));
+  if (!timing.ideal_gravity && (correction.payload != 0 || !correction.center.isZero(0))) {
+    const MatrixXd added =  // whose weight nobody holds
+        sampled.gravity_gradient -
+        controller::gravity_gradient(controller::DynamicsKernel(config_.model), q);
+    system.stiffness += (added + added.transpose()) / 2;
+    system.stiffness_factor.resize(0, q.size());
   }
-  const analysis::Gears gears = controller::elastic_joints(arm);
-  if (gears.any()) {
-    gears.extend(outside, system);
-    sampled.gears = gears;
-    sampled = analysis::with_gears(sampled);
-  }
+  const analysis::Gears& gears = arm.gears();
+  if (gears.any()) gears.extend(outside, system);
+  sampled = with_gears(sampled);
   const auto spectrum = analysis::analyze(system);
   const auto modes = analysis::sample_loop(system, spectrum, sampled).modes;
   std::vector<PredictedMode> predicted;

@@ -126,4 +126,10 @@ std::string integral_text(const std::vector<double>& decays) {
   return text + " 1/s.\n";
 }
 
+std::string assumes_text(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "  Assumes: " : ", ") + name;
+  return text.empty() ? "" : text + ".\n";
+}
+
 }  // namespace dashpot::apps

@@ -40,4 +40,8 @@ std::vector<Field<LoopMode>> mode_fields(const ModesTable& table = {});
 /// "" if there are none. `decays` by size.
 std::string integral_text(const std::vector<double>& decays);
 
+/// Returns a line that tells what a loop leaves out, see controller::loop_assumptions; "" if it
+/// leaves nothing out.
+std::string assumes_text(const std::vector<std::string>& names);
+
 }  // namespace dashpot::apps

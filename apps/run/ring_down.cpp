@@ -1,7 +1,8 @@
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/loop/simulated_loop.hpp>
 #include <dashpot/apps/report/mode_pairs.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
-#include <dashpot/apps/run/sampled_modes.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/identification/identification.hpp>
 
@@ -105,17 +106,32 @@ std::vector<Row> rows_of(const dashpot_modes& predicted) {
   return rows;
 }
 
+/// The loop of a scene at its rest as its drives hold, delay and filter the torque; friction and
+/// gravity are those that the controller believes in.
+controller::LoopAt loop_at_rest(const Scene& scene) {
+  controller::Settings settings = scene.arm->config.settings;
+  settings.period = scene.plant.period;
+  settings.analysis.sampled.delay = scene.plant.delay;
+  settings.analysis.sampled.cutoff = scene.plant.torque_cutoff;
+  settings.analysis.sampled.difference_velocity = scene.plant.difference_velocity;
+  const controller::Setpoint& setpoint = scene.steps.front().setpoint;
+  return controller::PostureLoop(scene.arm->config.model, settings)
+      .at(scene.rest, setpoint.gains, setpoint.mode);
+}
+
 /// Adds what the modes become in the sampled loop, and where they are there. A mode that moves
 /// further than kFarthest has no counterpart there that could be told from others.
 void add_sampled(const Scene& scene, RingDown& ring_down, std::vector<Row>& rows) {
-  const SampledModes modes = sampled_modes(scene);
-  ring_down.gain_margin = modes.gain_margin;
-  ring_down.growth = std::max(0.0, std::log(modes.sampled.spectral_radius) / scene.plant.period);
-  ring_down.integral_decays = controller::integral_decays(modes.sampled, scene.plant.period);
+  const auto [system, loop] = loop_at_rest(scene);
+  const analysis::Spectrum<> continuous = analysis::analyze(system);
+  const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
+  ring_down.gain_margin = analysis::gain_margin(system, continuous, loop);
+  ring_down.growth = std::max(0.0, std::log(sampled.spectral_radius) / scene.plant.period);
+  ring_down.integral_decays = controller::integral_decays(sampled, scene.plant.period);
   for (auto& [row, place] : rows) {
-    for (int i = 0; i < modes.continuous.modes.size(); ++i) {
-      const analysis::Mode<>& from = modes.continuous.modes[i];
-      const analysis::SampledMode& to = modes.sampled.modes[static_cast<std::size_t>(i)];
+    for (int i = 0; i < continuous.modes.size(); ++i) {
+      const analysis::Mode<>& from = continuous.modes[i];
+      const analysis::SampledMode& to = sampled.modes[static_cast<std::size_t>(i)];
       const bool same = std::abs(from.natural_frequency - row.predicted_frequency) <=
                             1e-6 * row.predicted_frequency &&
                         std::abs(from.damping_ratio - row.predicted_ratio) <= 1e-6;

@@ -1,38 +1,16 @@
 #pragma once
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/analysis/system.hpp>
 
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
-#include <string>
 
 namespace dashpot::apps {
-
-/// A place of the arm that moves: the row d of its motion, and the joint motion that moves it by
-/// one unit, n each.
-struct Place {
-  Eigen::RowVectorXd row;
-  Eigen::VectorXd motion;
-  std::string unit;  ///< of its receptance
-  bool linear = false;
-};
-
-/// Returns J# = M^-1 J' (J M^-1 J')^-1; next to a singularity that of the directions left.
-Eigen::MatrixXd consistent_inverse(const Eigen::MatrixXd& M, const Eigen::MatrixXd& J);
-
-/// Reads "tip/I" or "joint/I". Throws InputError.
-Place place_of(const std::string& place, const Eigen::MatrixXd& M, const Eigen::MatrixXd& J);
 
 /// Returns how a motion that is let go one unit away comes to rest, and how that looks from the
 /// goal: the step to a goal one unit away is one minus it.
 nlohmann::ordered_json release_json(const analysis::Response& response,
                                     const analysis::Spectrum<>& spectrum,
                                     const Eigen::VectorXd& motion, const Eigen::RowVectorXd& row);
-
-/// Returns the receptance of a place over the frequencies of the modes.
-nlohmann::ordered_json frequency_json(const analysis::System<>& system,
-                                      const analysis::Spectrum<>& spectrum,
-                                      const Eigen::RowVectorXd& row, const std::string& unit);
 
 }  // namespace dashpot::apps

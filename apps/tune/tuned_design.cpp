@@ -133,6 +133,7 @@ controller::Settings settings_of(const TunedArm& arm, const controller::AuditOpt
   settings.analysis.sampled.cutoff = stated.cutoff;
   settings.analysis.sampled.difference_velocity = stated.difference_velocity;
   settings.integral.time = stated.integral_time;
+  settings.feed_forward.gravity = !stated.ideal_gravity;
   settings.limits.gain_margin = stated.margin;
   settings.initial.mode = stated.mode;
   controller::Gains gains = stated.gains;
@@ -264,11 +265,11 @@ bool TunedDesign::designed() const {
 }
 
 TunedDesign read_design(const TunedArm& arm, const TuneJson& design) {
-  check_keys(
-      "design", design,
-      {"mode", "frame", "stiffness", "damping", "joint_stiffness", "joint_damping",
-       "null_stiffness", "null_damping", "null_projector", "rotation", "inertia_blocks", "period",
-       "delay", "cutoff", "difference_velocity", "integral_time", "gain_margin", "arm"});
+  check_keys("design", design,
+             {"mode", "frame", "stiffness", "damping", "joint_stiffness", "joint_damping",
+              "null_stiffness", "null_damping", "null_projector", "rotation", "inertia_blocks",
+              "period", "delay", "cutoff", "difference_velocity", "integral_time", "ideal_gravity",
+              "gain_margin", "arm"});
   TunedDesign result;
   controller::AuditOptions& stated = result.stated;
   controller::Gains& gains = stated.gains;
@@ -306,6 +307,7 @@ TunedDesign read_design(const TunedArm& arm, const TuneJson& design) {
   stated.cutoff = number_at(design, "cutoff", 0, 1e6, 0);
   stated.difference_velocity = flag_at(design, "difference_velocity");
   stated.integral_time = number_at(design, "integral_time", 0, 1e6, 0);
+  stated.ideal_gravity = flag_at(design, "ideal_gravity");
   stated.margin = number_at(design, "gain_margin", 1, 1e6, arm.settings().limits.gain_margin);
   if (result.designed() && (stated.kinematic_null_space || stated.inertia_blocks)) {
     throw InputError("damping",
@@ -340,6 +342,7 @@ TuneJson design_json(const TunedArm& arm) {
           {"cutoff", sampled.cutoff},
           {"difference_velocity", sampled.difference_velocity},
           {"integral_time", settings.integral.time},
+          {"ideal_gravity", !settings.feed_forward.gravity},
           {"gain_margin", settings.limits.gain_margin},
           {"arm", TuneJson::object()}};
 }

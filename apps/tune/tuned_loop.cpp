@@ -3,6 +3,7 @@
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/tune/place_motion.hpp>
 #include <dashpot/apps/tune/tuned_loop.hpp>
+#include <dashpot/apps/web/receptance.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/settings_check.hpp>
@@ -29,26 +30,6 @@ using controller::PostureNumbers;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using LoopJson = nlohmann::ordered_json;
-
-PostureNumbers numbers_of(const analysis::Spectrum<>& spectrum, double soft) {
-  PostureNumbers result;
-  double ratio = std::numeric_limits<double>::infinity(), fastest = ratio;
-  result.zero_modes = spectrum.zero_modes.count;
-  for (const analysis::Mode<>& mode : spectrum.modes) {
-    for (const auto& value : mode.eigenvalues) fastest = std::min(fastest, value.real());
-    if (mode.kind == analysis::ModeKind::kSoft || mode.natural_frequency < soft) {
-      ++result.zero_modes;
-    } else if (!std::isnan(mode.damping_ratio)) {
-      ratio = std::min(ratio, mode.damping_ratio);
-    }
-  }
-  for (const double rate : spectrum.zero_mode_rates) {
-    if (!std::isnan(rate)) fastest = std::min(fastest, rate);
-  }
-  if (std::isfinite(ratio)) result.smallest_ratio = ratio;
-  if (std::isfinite(fastest)) result.fastest_pole = fastest;
-  return result;
-}
 
 /// The joint with the largest part of a shape.
 int largest_joint(const Eigen::VectorXcd& shape, int n) {
@@ -186,53 +167,38 @@ TunedLoop::TunedLoop(const TunedArm& arm, const TunedDesign& design)
   validate(design.settings, arm.model().dof());
 }
 
-analysis::System<controller::kMaxJoints> TunedLoop::designed_system(
-    const JointVector& q, controller::PostureLoop& loop) const {
-  analysis::System<controller::kMaxJoints> system;
-  const controller::Status status =
-      loop.closed_loop(q, design_.settings.initial.gains, design_.stated.mode, system);
-  if (status != controller::Status::kOk) throw InputError("q", "is no posture");
-  return system;
-}
-
 TunedLoop::There TunedLoop::there(const JointVector& q) const {
   There result;
   result.parts = audit_.impedance(q);
-  if (design_.stated.period > 0) result.sampled = audit_.loop(q);
-  result.sampled.gears = gears_;
   analysis::SpectrumOptions options;
   options.soft_frequency = design_.stated.soft_frequency;
   if (design_.designed()) {
     controller::PostureLoop loop(arm_.model(), design_.settings);
-    const analysis::System<controller::kMaxJoints> system = designed_system(q, loop);
+    controller::LoopAt found = designed(q, loop);
     result.level = loop.level();
-    result.system = analysis::System<>(system.dof());
-    result.system.mass = system.mass;
-    result.system.damping = system.damping;
-    result.system.stiffness = system.stiffness;
-    result.system.stiffness_factor = system.stiffness_factor;
+    result.system = std::move(found.system);
+    result.sampled = std::move(found.sampled);
   } else {
     SystemEntry entry;
-    entry.gears = gears_;
+    entry.loop.gears = gears_;
     result.system = entry.system(result.parts);
+    if (design_.stated.period > 0) result.sampled = with_gears(audit_.loop(q));
   }
   result.spectrum = analysis::analyze(result.system, options);
   return result;
 }
 
 PostureNumbers TunedLoop::numbers(const There& loop) const {
-  PostureNumbers result = numbers_of(loop.spectrum, design_.stated.soft_frequency);
+  PostureNumbers result = controller::numbers_of(loop.spectrum);
   if (design_.stated.period > 0) {
-    result.gain_margin =
-        analysis::gain_margin(loop.system, loop.spectrum, analysis::with_gears(loop.sampled), 1e6,
-                              design_.stated.soft_frequency);
+    result.gain_margin = analysis::gain_margin(loop.system, loop.spectrum, loop.sampled);
   }
   return result;
 }
 
 PostureNumbers TunedLoop::numbers(const JointVector& q, controller::PostureLoop* loop) const {
   if (loop == nullptr) return audit_.numbers(q);
-  const std::optional<PostureNumbers> quick = audit_.numbers(q, designed_system(q, *loop));
+  const std::optional<PostureNumbers> quick = audit_.numbers(designed(q, *loop));
   return quick ? *quick : numbers(there(q));
 }
 
@@ -322,10 +288,11 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
                      {"smallest_ratio", here.smallest_ratio},
                      {"fastest_pole", here.fastest_pole},
                      {"gain_margin", std::isinf(here.gain_margin) ? 1e6 : here.gain_margin},
+                     {"assumes", loop_assumptions(design_.stated, &model)},
                      {"damping_level", nullptr},
                      {"limit", nullptr},
                      {"release", release_json(response, loop.spectrum, motion, row)},
-                     {"frequency", frequency_json(loop.system, loop.spectrum, row, moved.unit)},
+                     {"frequency", receptance_json(loop.system, loop.spectrum, row, moved.unit)},
                      {"sensitivity", nullptr},
                      {"system", system_json(loop.system, loop.parts, rigid)},
                      {"gains", gains_json(loop.parts, friction)}};
@@ -333,8 +300,7 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
     result["damping_level"] = {{"share", loop.level->level}, {"kept", loop.level->kept}};
   }
   if (design_.stated.period > 0) {
-    result["limit"] =
-        limit_json(loop.system, analysis::with_gears(loop.sampled), here.gain_margin, model);
+    result["limit"] = limit_json(loop.system, loop.sampled, here.gain_margin, model);
   }
   const bool task = design_.stated.mode == Mode::kCartesian;
   if (!design_.stated.inertia_blocks) {

@@ -35,15 +35,17 @@ class TunedLoop {
     analysis::TaskImpedance parts;  ///< as if no gear gave way
     analysis::System<> system;
     analysis::Spectrum<> spectrum;
-    analysis::SampledLoop sampled;                ///< without gears, see analysis::with_gears
+    analysis::SampledLoop sampled;
     std::optional<analysis::DampingLevel> level;  ///< of a ratio
   };
   There there(const controller::JointVector& q) const;
-  analysis::System<controller::kMaxJoints> designed_system(const controller::JointVector& q,
-                                                           controller::PostureLoop& loop) const;
   controller::PostureNumbers numbers(const controller::JointVector& q,
                                      controller::PostureLoop* loop) const;
   controller::PostureNumbers numbers(const There& loop) const;
+  controller::LoopAt designed(const controller::JointVector& q,
+                              controller::PostureLoop& loop) const {
+    return loop.at(q, design_.settings.initial.gains, design_.stated.mode);
+  }
 
   const TunedArm& arm_;
   const TunedDesign& design_;

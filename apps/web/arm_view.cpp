@@ -1,17 +1,13 @@
-#include <dashpot/analysis/response.hpp>
-#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/web/arm_view.hpp>
-#include <dashpot/controller/controller.hpp>
+#include <dashpot/apps/web/receptance.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <stdexcept>
 
 namespace dashpot::apps {
@@ -31,52 +27,6 @@ ArmJson frame_json(const KDL::Frame& frame) {
 
 ArmJson vector_json(const KDL::Vector& vector) {
   return ArmJson{vector.x(), vector.y(), vector.z()};
-}
-
-/// The closed loop at rest at q, as the controller has it once its gains have set in.
-analysis::System<> loop_at(const controller::Config& config, const Eigen::VectorXd& q,
-                           controller::Mode mode) {
-  controller::Settings settings = config.settings;
-  settings.motion.gain_time = settings.period;
-  settings.analysis.where = controller::Analysis::Where::kOff;
-  settings.analysis.sampled.interval = 0;
-  settings.initial.mode = mode;
-  controller::Controller controller(config.model, settings);
-  const controller::DynamicsResult there =
-      controller::evaluate(config.model, q, controller::JointVector::Zero(q.size()));
-  controller::RobotState state;
-  state.position = q;
-  state.velocity.setZero(q.size());
-  controller::Setpoint setpoint = settings.initial;
-  setpoint.joint_position = q;
-  setpoint.tip_pose = {there.p_BT_B, there.R_BT};
-  controller::JointVector torque;
-  for (int i = 0; i < 10; ++i) {
-    state.time = setpoint.time = i * std::llround(1e9 * settings.period);
-    controller.update(state, setpoint, torque);
-  }
-  analysis::System<controller::kMaxJoints> system;
-  controller.closed_loop(system);
-  analysis::System<> result(system.dof());
-  result.mass = system.mass;
-  result.damping = system.damping;
-  result.stiffness = system.stiffness;
-  result.stiffness_factor = system.stiffness_factor;
-  return result;
-}
-
-/// "joint/3": the row vector d with which the receptance is taken, d H d'.
-Eigen::RowVectorXd direction_of(const std::string& place, const controller::Jacobian& J) {
-  const auto slash = place.find('/');
-  const std::string where = place.substr(0, std::min(slash, place.size()));
-  const std::string digits = slash == std::string::npos ? "" : place.substr(slash + 1);
-  const Eigen::Index most = where == "joint" ? J.cols() : where == "tip" ? 6 : 0;
-  const bool number = !digits.empty() && digits.size() < 3 &&
-                      digits.find_first_not_of("0123456789") == std::string::npos;
-  const Eigen::Index i = number ? std::stoi(digits) : most;
-  if (i >= most) throw std::invalid_argument("there is no such place on this arm");
-  if (where == "tip") return J.row(i);
-  return Eigen::RowVectorXd::Unit(J.cols(), i);
 }
 
 }  // namespace
@@ -112,6 +62,7 @@ ArmView::ArmView(const std::string& config) : config_(controller::load_config(co
 
 ArmJson ArmView::chain() const {
   ArmJson document = chain_json(config_.model);
+  document["assumes"] = loop_assumptions(controller::timing_of(config_.settings), &config_.model);
   document["walls"] = ArmJson::array();
   const auto add_wall = [&walls = document["walls"]](
                             const std::string& name, const Eigen::Vector3d& p,
@@ -141,47 +92,23 @@ ArmJson ArmView::response(const std::vector<double>& position, int mode,
   const Eigen::VectorXd q = Eigen::Map<const Eigen::VectorXd>(
       position.data(), static_cast<Eigen::Index>(position.size()));
   if (q.size() != dof() || !q.allFinite()) throw std::runtime_error("the arm has other joints");
-  const controller::Jacobian J =
-      controller::evaluate(config_.model, q, controller::JointVector::Zero(q.size())).J;
   const bool cartesian = mode == state_t::CARTESIAN;
+  const auto robot =
+      controller::evaluate(config_.model, q, controller::JointVector::Zero(q.size()));
+  const Place seen = place_of(place, robot.M, robot.J);
   const analysis::System<> system =
-      loop_at(config_, q, cartesian ? controller::Mode::kCartesian : controller::Mode::kJoint);
-  Eigen::RowVectorXd d = Eigen::RowVectorXd::Zero(system.dof());  // of the links, not of motors
-  d.head(J.cols()) = direction_of(place, J);
+      controller::PostureLoop(config_.model, config_.settings)
+          .at(q, config_.settings.initial.gains,
+              cartesian ? controller::Mode::kCartesian : controller::Mode::kJoint)
+          .system;
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(system.dof());  // of the links, not of motors
+  row.head(q.size()) = seen.row;
   const analysis::Spectrum<> spectrum = analysis::analyze(system);
-  const analysis::Response response(system, spectrum);
-
-  double slowest = 1, fastest = 10;
-  ArmJson frequencies = ArmJson::array(), ratios = ArmJson::array();
-  for (const auto& mode_found : spectrum.modes) {
-    const double frequency = mode_found.natural_frequency;
-    frequencies.push_back(frequency);
-    ratios.push_back(mode_found.damping_ratio);
-    if (!std::isfinite(frequency) || frequency < 1e-3) continue;
-    slowest = std::min(slowest, frequency);
-    fastest = std::max(fastest, frequency);
-  }
-  constexpr int kPoints = 241;
-  ArmJson omegas = ArmJson::array(), magnitudes = ArmJson::array(), phases = ArmJson::array();
-  double phase = 0;
-  for (int i = 0; i < kPoints; ++i) {
-    const double omega = 0.1 * slowest * std::pow(100 * fastest / slowest, i / (kPoints - 1.0));
-    const std::complex<double> h = (d * response.receptance(omega) * d.transpose())(0, 0);
-    const double turn = std::arg(h) - phase;  // the phase goes on smoothly
-    phase += std::remainder(turn, 2 * M_PI);
-    omegas.push_back(omega);
-    magnitudes.push_back(std::abs(h));
-    phases.push_back(phase);
-  }
-  const Eigen::MatrixXd zero_modes = spectrum.zero_modes.basis.transpose();
-  const bool linear = place.starts_with("tip") ? place < "tip/3" : false;
-  return {{"omega", omegas},
-          {"magnitude", magnitudes},
-          {"phase", phases},
-          {"unit", linear ? "m/N" : "rad/(N m)"},
-          {"zero_modes", json_rows(zero_modes)},
-          {"natural_frequency", frequencies},
-          {"damping_ratio", ratios}};
+  ArmJson result = receptance_json(system, spectrum, row, seen.unit);
+  result["zero_modes"] = json_rows(spectrum.zero_modes.basis.transpose());
+  result["damping_ratio"] = ArmJson::array();
+  for (const auto& found : spectrum.modes) result["damping_ratio"].push_back(found.damping_ratio);
+  return result;
 }
 
 }  // namespace dashpot::apps

@@ -27,7 +27,8 @@ class ArmView {
   /// The gain margin that gains have to leave, no unit.
   double gain_margin() const { return config_.settings.limits.gain_margin; }
 
-  /// Returns the chain with {"walls": [{"name", "point", "normal", "stiffness"}]} besides. A wall's
+  /// Returns the chain with "assumes", see controller::loop_assumptions, and
+  /// {"walls": [{"name", "point", "normal", "stiffness"}]} besides. A wall's
   /// normal points to where the tip may be; a simulated wall has a stiffness, N/m, others null.
   nlohmann::ordered_json chain() const;
 
@@ -35,12 +36,9 @@ class ArmView {
   /// it asks for none.
   double wanted_ratio(int mode) const;
 
-  /// Returns the receptance with the gains of the configuration at a posture, by
-  /// analysis::Response:
-  /// {"omega" rad/s, "magnitude" and "phase" rad (rad/(N m) at "joint/I" with I from 0; m/N or
-  /// rad/(N m) at "tip/D" with D from 0 to 5), "unit", "zero_modes" (a row of n for each),
-  /// "natural_frequency", "damping_ratio"}. Throws std::invalid_argument for another `place`, and
-  /// std::runtime_error if there is no response there.
+  /// Returns the receptance with the gains of the configuration at a posture, see receptance_json
+  /// and place_of, with "zero_modes" (a row of n for each) and "damping_ratio". Throws InputError
+  /// for another `place`, and std::runtime_error if there is no response there.
   nlohmann::ordered_json response(const std::vector<double>& position, int mode,
                                   const std::string& place) const;
 

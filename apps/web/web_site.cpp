@@ -75,7 +75,7 @@ HttpAnswer WebSite::response(const std::map<std::string, std::string>& query) {
   const auto mode = joint ? state_t::JOINT : state_t::CARTESIAN;
   try {
     return json_answer(arm_->response(posture, mode, value_of(query, "at")));
-  } catch (const std::invalid_argument& error) {
+  } catch (const controller::InputError& error) {
     return complaint(400, error.what());
   } catch (const std::exception& error) {
     return complaint(404, error.what());

@@ -45,8 +45,7 @@ Bounded smallest(const std::vector<Bounded>& numbers) {
 }
 
 /// Sets the numbers of the continuous loop, and their bounds.
-void read_spectrum(PostureAudit& result) {
-  const analysis::Spectrum<>& spectrum = result.spectrum;
+void read_spectrum(const analysis::Spectrum<>& spectrum, PostureAudit& result) {
   std::vector<Bounded> ratios, poles;
   result.numbers.zero_modes = spectrum.zero_modes.count;
   for (const analysis::Mode<>& mode : spectrum.modes) {
@@ -136,12 +135,16 @@ void take_into_joints(const NullSpace& null_space, Impedance& impedance) {
 
 }  // namespace
 
+PostureNumbers numbers_of(const analysis::Spectrum<>& spectrum) {
+  PostureAudit result;
+  read_spectrum(spectrum, result);
+  return result.numbers;
+}
+
 Audit::Audit(const RobotModel& model, const AuditOptions& options)
     : model_(model),
       options_(options),
-      kernel_(model),
-      elastic_(elastic_joints(model)),
-      friction_(model.joint_values(&Joint::viscous_friction)),
+      arm_(model, options),
       impedance_(stated_impedance(options.gains,
                                   {options.mode, options.half_quaternion, options.inertia_blocks},
                                   model.dof())) {
@@ -171,11 +174,6 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
   require(options_.lower.size() == n && options_.upper.size() == n &&
               (options_.lower.array() <= options_.upper.array()).all(),
           "lower, upper: need n entries, none of lower above that of upper");
-  loop_.period = options.period;
-  loop_.delay = options.delay;
-  loop_.torque_cutoff = options.cutoff;
-  loop_.difference_velocity = options.difference_velocity;
-  if (!friction_.isZero(0)) loop_.friction = friction_.asDiagonal();
 }
 
 DynamicsResult Audit::evaluate(const JointVector& q) const {
@@ -183,7 +181,7 @@ DynamicsResult Audit::evaluate(const JointVector& q) const {
                                         std::to_string(model_.dof()));
   require(q.allFinite(), "q: has an entry that is not a finite number");
   DynamicsResult robot;
-  kernel_.evaluate(q, JointVector::Zero(q.size()), robot);
+  arm_.kernel().evaluate(q, JointVector::Zero(q.size()), robot);
   return robot;
 }
 
@@ -205,11 +203,9 @@ Impedance Audit::impedance_at(const DynamicsResult& robot) const {
   return result;
 }
 
-analysis::SampledLoop Audit::loop_at(const DynamicsResult& robot,
-                                     const Impedance& impedance) const {
-  analysis::SampledLoop loop = loop_;
-  loop.memory = integral_memory(robot, impedance, options_.integral_time, loop.period);
-  return loop;
+analysis::SampledLoop Audit::loop(const JointVector& q, const DynamicsResult& robot) const {
+  const JointMatrix K_I = integral_stiffness(robot, impedance_at(robot), options_.integral_time);
+  return arm_.at(q, nullptr, K_I);
 }
 
 PostureNumbers Audit::numbers(const JointVector& q) const {
@@ -225,44 +221,44 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   } else if (impedance.null_space()) {
     null_space.compute(robot, impedance);
   }
-  LoopSystem loop;
   analysis::System<kMaxJoints> system;
-  loop.form(robot, impedance, null_space, friction_, system);
-  if (elastic_.any()) elastic_.extend_factored(system);
-  const std::optional<PostureNumbers> result = numbers(robot, system);
+  LoopSystem().form(robot, impedance, null_space, arm_.friction(), system);
+  if (arm_.gears().any()) arm_.gears().extend_factored(system);
+  const std::optional<PostureNumbers> result =
+      numbers(system, [&] { return with_gears(loop(q, robot)); });
   return result ? *result : audit(q).numbers;
 }
 
-std::optional<PostureNumbers> Audit::numbers(const JointVector& q,
-                                             const analysis::System<kMaxJoints>& loop) const {
-  analysis::System<kMaxJoints> system = loop;
+std::optional<PostureNumbers> Audit::numbers(const LoopAt& loop) const {
+  const MatrixXd& W = loop.system.stiffness_factor;
+  analysis::System<kMaxJoints> system(loop.system.dof());
+  system.mass = loop.system.mass;
+  system.damping = loop.system.damping;
+  system.stiffness_factor.resize(W.rows(), W.cols());
   Index rows = 0;  // without those of springs that are zero, such as a null space's
-  for (Index i = 0; i < loop.stiffness_factor.rows(); ++i) {
-    if (loop.stiffness_factor.row(i).isZero(0)) continue;
-    system.stiffness_factor.row(rows++) = loop.stiffness_factor.row(i);
+  for (const auto& row : W.rowwise()) {
+    if (!row.isZero(0)) system.stiffness_factor.row(rows++) = row;
   }
   system.stiffness_factor.conservativeResize(rows, Eigen::NoChange);
-  return numbers(evaluate(q), system);
+  return numbers(system, [&] { return loop.sampled; });
 }
 
-std::optional<PostureNumbers> Audit::numbers(const DynamicsResult& robot,
-                                             const analysis::System<kMaxJoints>& system) const {
+std::optional<PostureNumbers> Audit::numbers(
+    const analysis::System<kMaxJoints>& system,
+    const std::function<analysis::SampledLoop()>& sampled) const {
   if (system.stiffness_factor.rows() == 0) return std::nullopt;
   analysis::ElasticForm<kMaxJoints> form;
   Eigen::Matrix<analysis::Complex, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints, 1> values;
   PostureNumbers result;
   const bool clear = analysis::to_elastic_form(system, form) == analysis::Status::kOk &&
                      form.slowest > options_.soft_frequency &&
-                     form.modes() == springs_ + elastic_.count() &&
+                     form.modes() == springs_ + arm_.gears().count() &&
                      analysis::elastic_eigenvalues(form, values) == analysis::Status::kOk &&
                      read_eigenvalues(values, options_.soft_frequency, result);
   if (!clear) return std::nullopt;
   result.zero_modes = model_.dof() - springs_;
   if (options_.period > 0) try {
-      analysis::SampledLoop sampled = loop_at(robot, impedance_at(robot));
-      sampled.gears = elastic_;
-      sampled = analysis::with_gears(sampled);
-      result.gain_margin = analysis::gain_margin(form, sampled, 1e6, options_.soft_frequency);
+      result.gain_margin = analysis::gain_margin(form, sampled());
     } catch (const std::runtime_error&) {
       result.gain_margin = kNan;
     }
@@ -276,7 +272,7 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
   const int n = model_.dof();
   if (options_.mode == Mode::kJoint) {
     result.stiffness = impedance.joint_stiffness;
-    result.damping = impedance.joint_damping + JointMatrix(friction_.asDiagonal());
+    result.damping = impedance.joint_damping + JointMatrix(arm_.friction().asDiagonal());
     return result;
   }
   const bool tool = options_.gains.frame == Frame::kTool;
@@ -287,7 +283,7 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
   }
   result.task_stiffness = (tool ? impedance.tool : impedance.base).stiffness;
   result.task_damping = (tool ? impedance.tool : impedance.base).damping;
-  result.damping = MatrixXd(friction_.asDiagonal());
+  result.damping = MatrixXd(arm_.friction().asDiagonal());
   if (!impedance.null_space() || n == 0) return result;
   const auto projected = [&](const JointVector& gains) {
     return analysis::null_space_damping(kinematic() ? MatrixXd::Identity(n, n) : result.mass,
@@ -305,7 +301,7 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
 
 analysis::System<> Audit::system_of(const analysis::TaskImpedance& impedance) const {
   analysis::System<> system = analysis::to_joint_space(impedance);
-  if (elastic_.any()) elastic_.extend(system);
+  if (arm_.gears().any()) arm_.gears().extend(system);
   return system;
 }
 
@@ -317,14 +313,11 @@ PostureAudit Audit::audit(const JointVector& q) const {
   analysis::SpectrumOptions options;
   options.soft_frequency = options_.soft_frequency;
   result.spectrum = analysis::analyze(system, options);
-  read_spectrum(result);
+  read_spectrum(result.spectrum, result);
   result.numbers.singular = result.numbers.zero_modes > model_.dof() - springs_;
   if (options_.period == 0) return result;
-  analysis::SampledLoop loop = loop_at(robot, impedance_at(robot));
-  loop.gears = elastic_;
-  loop = analysis::with_gears(loop);
-  result.numbers.gain_margin =
-      analysis::gain_margin(system, result.spectrum, loop, 1e6, options_.soft_frequency);
+  const analysis::SampledLoop loop = with_gears(this->loop(q, robot));
+  result.numbers.gain_margin = analysis::gain_margin(system, result.spectrum, loop);
   if (options_.integral_time > 0) {
     result.integral_decays =
         integral_decays(sample_loop(system, result.spectrum, loop), loop.period);
@@ -355,7 +348,7 @@ MissingRotors Audit::missing_rotors(const PostureAudit& found) const {
   const PostureAudit with = with_rotors.audit(found.q);
   missing.numbers = with.numbers;
   MatrixXd mass = with_rotors.evaluate(found.q).M;
-  if (elastic_.any()) with_rotors.elastic_.extend_mass(mass);
+  if (arm_.gears().any()) with_rotors.arm_.gears().extend_mass(mass);
   missing.damping_ratios = paired_ratios(mass, found.spectrum, with.spectrum);
   return missing;
 }
@@ -375,14 +368,13 @@ std::vector<PostureNumbers> Audit::sample(std::uint64_t seed, std::int64_t first
 analysis::TaskImpedance Audit::undamped(const JointVector& q) const {
   analysis::TaskImpedance impedance = task_impedance(evaluate(q));
   impedance.task_damping.reset();
-  if (!impedance.jacobian) impedance.damping = MatrixXd(friction_.asDiagonal());
+  if (!impedance.jacobian) impedance.damping = MatrixXd(arm_.friction().asDiagonal());
   return impedance;
 }
 
 analysis::SampledLoop Audit::loop(const JointVector& q) const {
   require(options_.period > 0, "period: a loop needs one");
-  const DynamicsResult robot = evaluate(q);
-  return loop_at(robot, impedance_at(robot));
+  return loop(q, evaluate(q));
 }
 
 DampingSuggestion Audit::suggest(const JointVector& q, double ratio) const {
@@ -393,13 +385,11 @@ DampingSuggestion Audit::suggest(const JointVector& q, double ratio) const {
   const analysis::DampingDesign full = analysis::design_damping(impedance, target);
   const Eigen::VectorXd diagonal = full.damping.diagonal();
   const auto smallest_ratio = [&](const MatrixXd& damping) {
-    PostureAudit posture;
     analysis::SpectrumOptions options;
     options.soft_frequency = options_.soft_frequency;
-    posture.spectrum =
-        analysis::analyze(system_of(analysis::with_damping(impedance, damping)), options);
-    read_spectrum(posture);
-    return posture.numbers.smallest_ratio;
+    return numbers_of(
+               analysis::analyze(system_of(analysis::with_damping(impedance, damping)), options))
+        .smallest_ratio;
   };
   return {ratio, full.damping, diagonal, smallest_ratio(full.damping),
           smallest_ratio(MatrixXd(diagonal.asDiagonal()))};

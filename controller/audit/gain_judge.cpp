@@ -1,12 +1,9 @@
-#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/controller/model/least_inertia.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/rotors.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <algorithm>
-#include <exception>
 
 namespace dashpot::controller {
 namespace {
@@ -35,36 +32,29 @@ GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
     : model_(model),
       settings_(settings),
       attached_(model.attachment()),
-      kernel_(model),
-      bare_(unloaded(model)),
       loaded_(model.attachment().mass > 0),
-      loop_(sampled_loop(model, settings)),
-      elastic_(elastic_joints(model)),
+      bare_(unloaded(model), timing_of(settings)),
       posture_loop_(model, judging(settings)) {}
 
 GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
   const double wanted = settings_.limits.gain_margin;
   Verdict worst{wanted, Mode::kJoint};
-  const Eigen::MatrixXd gravity = gravity_of(kernel_, q);
-  const JointVector rest = JointVector::Zero(q.size());
-  DynamicsResult robot, bare;
-  kernel_.evaluate(q, rest, robot);
-  if (loaded_) bare_.evaluate(q, rest, bare);
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
-    Setpoint setpoint;
-    setpoint.mode = mode;
-    setpoint.gains = gains;
-    const Impedance springs(setpoint, static_cast<int>(q.size()));
-    loop_.memory = integral_memory(robot, springs, settings_.integral.time, loop_.period);
     analysis::System<kMaxJoints> system;
     const bool known = posture_loop_.closed_loop(q, gains, mode, system) == Status::kOk;
-    const double found = known ? margin(system, gravity, wanted) : 0;
+    const double found = known ? margin_up_to(system, posture_loop_.sampled(), wanted) : 0;
     if (found < worst.margin) worst = {found, mode};
     if (!known || !loaded_ || !counts_payload(gains, mode)) continue;
+    DynamicsResult bare;
+    bare_.kernel().evaluate(q, JointVector::Zero(q.size()), bare);
     system.mass = bare.M;
-    if (elastic_.any()) elastic_.extend_mass(system.mass);
+    if (bare_.gears().any()) bare_.gears().extend_mass(system.mass);
+    analysis::SampledLoop loop = posture_loop_.sampled();
+    const analysis::SampledLoop of_bare = with_gears(bare_.at(q));
+    loop.gravity_gradient = of_bare.gravity_gradient;
+    loop.compensation = of_bare.compensation;
     const double enough = std::min(kDropped, wanted);
-    const double dropped = margin(system, gravity_of(bare_, q), enough);
+    const double dropped = margin_up_to(system, loop, enough);
     if (dropped < std::min(enough, worst.margin)) worst = {dropped, mode, true};
   }
   worst.q = q;
@@ -86,13 +76,8 @@ std::string GainJudge::missing(const Verdict& verdict, const Gains& gains) const
   const RobotModel model = model_.with(attached_);
   std::string missing = missing_rotors_text(model);
   if (missing.empty() || verdict.q.size() == 0) return missing;
-  PostureLoop loop(model, judging(settings_));
-  analysis::System<kMaxJoints> closed;
-  if (loop.closed_loop(verdict.q, gains, verdict.mode, closed) != Status::kOk) return missing;
-  analysis::System<> system(closed.dof());
-  system.mass = closed.mass;
-  system.damping = closed.damping;
-  system.stiffness = closed.stiffness;
+  const analysis::System<> system =
+      PostureLoop(model, judging(settings_)).at(verdict.q, gains, verdict.mode).system;
   const std::optional<JointVector> enough =
       enough_reflected_inertia(model, system, settings_.period, [&](const RobotModel& with_rotors) {
         return GainJudge(with_rotors, settings_).judge(verdict.q, gains).margin >=
@@ -110,25 +95,6 @@ std::string GainJudge::missing(const Verdict& verdict, const Gains& gains) const
   if (!enough) return missing + ", but no reflected inertia would be enough. " + hint;
   return missing + ", and with " + inertia_text(model, *enough) + " the margin would be enough. " +
          hint;
-}
-
-Eigen::MatrixXd GainJudge::gravity_of(const DynamicsKernel& kernel, const JointVector& q) const {
-  return settings_.feed_forward.gravity ? gravity_gradient(kernel, q) : Eigen::MatrixXd();
-}
-
-double GainJudge::margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,
-                         double enough) try {
-  analysis::SampledLoop loop = loop_;
-  loop.gravity_gradient = gravity;
-  loop.gears = elastic_;
-  loop = analysis::with_gears(loop);
-  analysis::SpectrumSolver<kMaxJoints> solver;
-  analysis::Spectrum<kMaxJoints> spectrum;
-  const analysis::Status solved = solver.solve(system, spectrum);
-  if (solved != analysis::Status::kOk && solved != analysis::Status::kUncertified) return 0;
-  return std::min(enough, analysis::gain_margin(system, spectrum, loop, enough, kSlowestVibration));
-} catch (const std::exception&) {  // no convergence
-  return 0;
 }
 
 }  // namespace dashpot::controller

@@ -1,10 +1,8 @@
-#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/core/gears_stop.hpp>
-#include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/safety/brake.hpp>
 #include <dashpot/controller/settings_check.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <algorithm>
 #include <iomanip>
@@ -25,37 +23,25 @@ std::string number(double value) {
   return text.str();
 }
 
-/// Returns the margin of a loop in joint coordinates, at most 1; 0 if there is none.
-double margin_of(analysis::System<kMaxJoints> system, const analysis::SampledLoop& loop,
-                 const analysis::Gears& gears) {
-  gears.extend(system);
-  analysis::Spectrum<kMaxJoints> spectrum;
-  const analysis::Status solved = analysis::SpectrumSolver<kMaxJoints>().solve(system, spectrum);
-  if (solved != analysis::Status::kOk && solved != analysis::Status::kUncertified) return 0;
-  return std::min(1.0, analysis::gain_margin(system, spectrum, loop, 1, kSlowestVibration));
-}
-
 }  // namespace
 
 double gears_stopping_time(const RobotModel& model, const Settings& settings, double wanted) {
-  const analysis::Gears gears = elastic_joints(model);
-  if (!gears.any()) return 0;
-  analysis::SampledLoop loop = sampled_loop(model, settings);
-  const Eigen::MatrixXd friction = loop.friction;
-  loop.gears = gears;
-  loop = analysis::with_gears(loop);
-  const DynamicsKernel kernel(model);
+  const SampledArm arm(model, timing_of(settings));
+  if (!arm.gears().any()) return 0;
   const PostureSequence postures(settings.limits.position_lower, settings.limits.position_upper);
   const JointVector rest = JointVector::Zero(model.dof());
   DynamicsResult robot;
   double T = kEdge * wanted;
   for (int k = 0; k < kPostures && T <= kLongest; ++k) {
-    kernel.evaluate(postures.at(k), rest, robot);
+    arm.kernel().evaluate(postures.at(k), rest, robot);
+    const analysis::SampledLoop loop = with_gears(arm.at(postures.at(k)));
     for (double margin = 0; margin == 0 && T <= kLongest;) {
       analysis::System<kMaxJoints> system(model.dof());
       system.mass = robot.M;
-      system.damping = robot.M * (kMargin / T) + friction;
-      margin = margin_of(system, loop, gears);
+      system.damping = robot.M * (kMargin / T);
+      system.damping.diagonal() += arm.friction();
+      arm.gears().extend(system);
+      margin = margin_up_to(system, loop, 1);
       T = margin > 0 ? T / margin : kSearched * T;
     }
   }

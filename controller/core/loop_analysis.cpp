@@ -85,9 +85,8 @@ void LoopAnalysis::closed_loop(const Loop& loop,
 PassivePart LoopAnalysis::passive(const Loop& loop) const noexcept {
   const Jacobian& J = loop.now.robot.J;
   const Load load = settings_.task_terms.load;
-  JointMatrix of_load = JointMatrix::Zero(n_, n_);
-  if (load != Load::kIgnored) of_load = stiffness_of_load(J, load, loop.now.external_wrench);
-  return passive_part(J, settings_.environment, of_load);
+  return passive_part(J, settings_.environment,
+                      stiffness_of_load(J, load, loop.now.external_wrench));
 }
 
 void LoopAnalysis::hand_over(const Loop& loop) noexcept {
@@ -99,10 +98,7 @@ void LoopAnalysis::hand_over(const Loop& loop) noexcept {
   task.attachment = loop.attachment;
   closed_loop(loop, task.system);
   task.passive = passive(loop);
-  task.integral.resize(0, 0);
-  if (settings_.integral.time > 0) {
-    task.integral = integral_stiffness(now.robot, loop.acting.impedance, settings_.integral.time);
-  }
+  task.integral = integral_stiffness(now.robot, loop.acting.impedance, settings_.integral.time);
   sampled_->hand_over();
 }
 

@@ -92,7 +92,8 @@ void add_null_space_rate(const NullSpaceChange& change, const Jacobian& J, const
 }  // namespace
 
 JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) noexcept {
-  if (load == Load::kJointTorques) return JointMatrix::Zero(J.cols(), J.cols());
+  if (load == Load::kIgnored || load == Load::kJointTorques)
+    return JointMatrix::Zero(J.cols(), J.cols());
   JointMatrix K = -geometric_stiffness(J, f);
   if (load == Load::kToolWrench) {
     for (Index k = 0; k < J.cols(); ++k) {
@@ -171,6 +172,7 @@ JointVector friction_left(const RobotModel& model, const Settings& settings) {
 
 JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
                                double time) noexcept {
+  if (time == 0) return {};
   const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
   JointMatrix K = impedance.joint_stiffness;
   add_congruence(robot.J, K_C, robot.J, K);

@@ -62,7 +62,7 @@ PassivePart passive_part(const Jacobian& J, const Environment& environment,
 JointVector friction_left(const RobotModel& model, const Settings& settings);
 
 /// Returns K_I (n x n, N m/(rad s)): the torque of the integral of these springs grows by -K_I q,
-/// K_I = (K_q + J' K_C J) / time.
+/// K_I = (K_q + J' K_C J) / time. No entries if the time is zero: there is no integral.
 JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
                                double time) noexcept;
 

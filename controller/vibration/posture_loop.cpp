@@ -1,11 +1,117 @@
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/posture_loop.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
+
+#include <Eigen/Eigenvalues>
+#include <exception>
+#include <stdexcept>
+#include <utility>
 
 namespace dashpot::controller {
 
-PostureLoop::PostureLoop(const RobotModel& model, const Settings& settings)
+LoopTiming timing_of(const Settings& settings) {
+  const Analysis::Sampled& sampled = settings.analysis.sampled;
+  return {settings.period,        sampled.delay,
+          sampled.cutoff,         sampled.difference_velocity,
+          settings.integral.time, !settings.feed_forward.gravity};
+}
+
+analysis::SampledLoop timed(const LoopTiming& timing, analysis::SampledLoop loop) {
+  loop.period = timing.period;
+  loop.delay = timing.delay;
+  loop.torque_cutoff = timing.cutoff;
+  loop.difference_velocity = timing.difference_velocity;
+  if (timing.ideal_gravity) loop.gravity_gradient.resize(0, 0);
+  loop.slowest = kSlowestVibration;
+  return loop;
+}
+
+std::vector<std::string> loop_assumptions(const LoopTiming& timing, const RobotModel* model) {
+  std::vector<std::string> names;
+  if (timing.period == 0) {
+    names.emplace_back("continuous");
+  } else {
+    if (timing.ideal_gravity) names.emplace_back("gravity ideal");
+    if (timing.delay == 0) names.emplace_back("delay none");
+  }
+  if (model == nullptr) return names;
+  if (unknown_rotors(*model).any()) names.emplace_back("rotors unknown");
+  if (model->elastic_joints() == 0) names.emplace_back("gears rigid");
+  if (model->joint_values(&Joint::viscous_friction).isZero(0)) names.emplace_back("friction none");
+  return names;
+}
+
+Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector& q) {
+  constexpr double kStep = 1e-5;  // rad
+  DynamicsResult after, before;
+  const JointVector none = JointVector::Zero(q.size());
+  Eigen::MatrixXd gradient(q.size(), q.size());
+  for (Eigen::Index i = 0; i < q.size(); ++i) {
+    const JointVector step = kStep * JointVector::Unit(q.size(), i);
+    kernel.evaluate(q + step, none, after);
+    kernel.evaluate(q - step, none, before);
+    gradient.col(i) = (after.gravity - before.gravity) / (2 * kStep);
+  }
+  return gradient;
+}
+
+analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period) {
+  constexpr double kNothing = 1e-12;  // of the largest eigenvalue
+  const Eigen::Index n = K_I.rows();
+  if (n == 0 || K_I.isZero(0)) return {};
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(K_I);
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const Eigen::Index rank = (values.array() > kNothing * values[n - 1]).count();
+  const Eigen::MatrixXd F =
+      eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
+  return {Eigen::MatrixXd::Identity(rank, rank), period * F.transpose(), F};
+}
+
+SampledArm::SampledArm(const RobotModel& model, const LoopTiming& timing)
     : kernel_(model),
-      elastic_(elastic_joints(model)),
+      timing_(timing),
+      gears_(elastic_joints(model)),
+      friction_(model.joint_values(&Joint::viscous_friction)) {}
+
+analysis::SampledLoop SampledArm::at(const JointVector& q, const PassivePart* outside,
+                                     const JointMatrix& K_I) const {
+  analysis::SampledLoop loop;
+  if (!friction_.isZero(0)) loop.friction = friction_.asDiagonal();
+  if (outside != nullptr && !outside->damping.isZero(0)) {
+    loop.friction = outside->damping;
+    loop.friction.diagonal() += friction_;
+  }
+  if (outside != nullptr && !outside->stiffness.isZero(0)) {
+    loop.passive_stiffness = outside->stiffness;
+  }
+  if (!timing_.ideal_gravity) loop.gravity_gradient = gravity_gradient(kernel_, q);
+  loop.memory = integral_memory(K_I, timing_.period);
+  loop.gears = gears_;
+  return timed(timing_, std::move(loop));
+}
+
+analysis::System<> unbounded(const analysis::System<kMaxJoints>& system) {
+  analysis::System<> result(system.dof());
+  result.mass = system.mass;
+  result.damping = system.damping;
+  result.stiffness = system.stiffness;
+  result.stiffness_factor = system.stiffness_factor;
+  return result;
+}
+
+double margin_up_to(const analysis::System<kMaxJoints>& system, const analysis::SampledLoop& loop,
+                    double enough) try {
+  analysis::Spectrum<kMaxJoints> spectrum;
+  const analysis::Status solved = analysis::SpectrumSolver<kMaxJoints>().solve(system, spectrum);
+  if (solved != analysis::Status::kOk && solved != analysis::Status::kUncertified) return 0;
+  return std::min(enough, analysis::gain_margin(system, spectrum, loop, enough));
+} catch (const std::exception&) {  // no convergence
+  return 0;
+}
+
+PostureLoop::PostureLoop(const RobotModel& model, const Settings& settings)
+    : arm_(model, timing_of(settings)),
       settings_(settings),
       friction_left_(friction_left(model, settings)),
       damping_(designed_damping(model, settings)) {}
@@ -19,7 +125,7 @@ Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode m
   const auto n = static_cast<int>(q.size());
   const JointVector rest = JointVector::Zero(n);
   DynamicsResult robot;
-  kernel_.evaluate(q, rest, robot);
+  arm_.kernel().evaluate(q, rest, robot);
   Setpoint setpoint;
   setpoint.mode = mode;
   setpoint.gains = gains;
@@ -27,18 +133,33 @@ Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode m
   damping_.reset();
   const Impedance& impedance = damping_.update(given, robot);
   level_ = damping_.level(given.now());
+  q_ = q;
+  integral_ = integral_stiffness(robot, impedance, settings_.integral.time);
+  outside_ = passive_part(robot.J, settings_.environment,
+                          stiffness_of_load(robot.J, settings_.task_terms.load, external_wrench));
   controller::closed_loop(robot, rest,
                           {impedance,
                            damping_.null_space(),
                            friction_left_,
                            {external_wrench},
-                           Posture{&kernel_, &q, rest, rest}},
+                           Posture{&arm_.kernel(), &q, rest, rest}},
                           settings_, system);
-  if (elastic_.any()) {
-    const JointMatrix load = stiffness_of_load(robot.J, settings_.task_terms.load, external_wrench);
-    elastic_.extend(passive_part(robot.J, settings_.environment, load), system);
-  }
+  if (arm_.gears().any()) arm_.gears().extend(outside_, system);
   return Status::kOk;
+}
+
+analysis::SampledLoop PostureLoop::sampled() const {
+  return with_gears(arm_.at(q_, &outside_, integral_));
+}
+
+LoopAt PostureLoop::at(const JointVector& q, const Gains& gains, Mode mode,
+                       const Vector6& external_wrench) {
+  analysis::System<kMaxJoints> system;
+  const Status status = closed_loop(q, gains, mode, system, external_wrench);
+  if (status != Status::kOk) {
+    throw std::invalid_argument(std::string("closed loop: ") + to_text(status));
+  }
+  return {unbounded(system), sampled()};
 }
 
 }  // namespace dashpot::controller

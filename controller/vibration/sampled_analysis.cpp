@@ -1,10 +1,8 @@
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <pthread.h>
 #include <sched.h>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -18,56 +16,15 @@ constexpr std::chrono::milliseconds kLook{5};  // how often the thread looks for
 
 }  // namespace
 
-analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings) {
-  const Analysis::Sampled& sampled = settings.analysis.sampled;
-  analysis::SampledLoop loop;
-  loop.period = settings.period;
-  loop.delay = sampled.delay;
-  loop.torque_cutoff = sampled.cutoff;
-  loop.difference_velocity = sampled.difference_velocity;
-  loop.friction = Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).asDiagonal();
-  return loop;
-}
-
-Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector& q) {
-  constexpr double kStep = 1e-5;  // rad
-  DynamicsResult after, before;
-  const JointVector none = JointVector::Zero(q.size());
-  Eigen::MatrixXd gradient(q.size(), q.size());
-  for (Eigen::Index i = 0; i < q.size(); ++i) {
-    const JointVector step = kStep * JointVector::Unit(q.size(), i);
-    kernel.evaluate(q + step, none, after);
-    kernel.evaluate(q - step, none, before);
-    gradient.col(i) = (after.gravity - before.gravity) / (2 * kStep);
-  }
-  return gradient;
-}
-
 DesignedDamping designed_damping(const RobotModel& model, const Settings& settings) {
   constexpr double kReserve = 1.02;  // of the margin, for what couples modes
   JointVector subtracted = JointVector::Zero(model.dof());
   if (settings.subtract_friction) subtracted = friction_left(model, settings).cwiseMax(0);
   const double margin = settings.limits.gain_margin;
   if (margin == 1) return DesignedDamping(subtracted);
-  return DesignedDamping(subtracted, {sampled_loop(model, settings), kReserve * margin});
-}
-
-analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period) {
-  constexpr double kNothing = 1e-12;  // of the largest eigenvalue
-  const Eigen::Index n = K_I.rows();
-  if (n == 0 || K_I.isZero(0)) return {};
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(K_I);
-  const Eigen::VectorXd& values = eigen.eigenvalues();
-  const Eigen::Index rank = (values.array() > kNothing * values[n - 1]).count();
-  const Eigen::MatrixXd F =
-      eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
-  return {Eigen::MatrixXd::Identity(rank, rank), period * F.transpose(), F};
-}
-
-analysis::ControllerMemory integral_memory(const DynamicsResult& robot, const Impedance& springs,
-                                           double time, double period) {
-  if (time == 0) return {};
-  return integral_memory(integral_stiffness(robot, springs, time), period);
+  analysis::SampledLoop loop;
+  loop.friction = Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).asDiagonal();
+  return DesignedDamping(subtracted, {timed(timing_of(settings), loop), kReserve * margin});
 }
 
 std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period) {
@@ -80,15 +37,12 @@ std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, do
 }
 
 SampledAnalysis::SampledAnalysis(const RobotModel& model, const Settings& settings)
-    : kernel_(model),
-      elastic_(elastic_joints(model)),
-      gravity_(settings.feed_forward.gravity),
+    : arm_(model, timing_of(settings)),
       interval_(static_cast<std::uint64_t>(
           std::clamp(std::round(settings.analysis.sampled.interval / settings.period), 1.0, 1e15))),
       first_(1 + static_cast<std::uint64_t>(std::clamp(
                      std::ceil(settings.motion.gain_time / settings.period), 1.0, 1e15))),
       next_(first_),
-      loop_(sampled_loop(model, settings)),
       thread_([this] { run(); }) {}
 
 SampledAnalysis::~SampledAnalysis() {
@@ -143,24 +97,15 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   result.tick = task.tick;
   result.resets = task.resets;
   result.position = task.position;
-  analysis::System<> system(task.system.dof());
-  system.mass = task.system.mass;
-  system.damping = task.system.damping;
-  system.stiffness = task.system.stiffness;
-  system.stiffness_factor = task.system.stiffness_factor;
+  const analysis::System<> system = unbounded(task.system);
   const analysis::Spectrum<> continuous = analysis::analyze(system);
   result.status = continuous.status;
-  analysis::SampledLoop loop = loop_;
-  loop.friction += task.passive.damping;
-  loop.passive_stiffness = task.passive.stiffness;
-  loop.memory = integral_memory(task.integral, loop.period);
-  kernel_.attach(task.attachment);
-  if (gravity_) loop.gravity_gradient = gravity_gradient(kernel_, task.position);
-  loop.gears = elastic_;
-  loop = analysis::with_gears(loop);
+  arm_.attach(task.attachment);
+  const analysis::SampledLoop loop =
+      with_gears(arm_.at(task.position, &task.passive, task.integral));
   const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
   result.spectral_radius = sampled.spectral_radius;
-  result.gain_margin = analysis::gain_margin(system, continuous, loop, 1e6, kSlowestVibration);
+  result.gain_margin = analysis::gain_margin(system, continuous, loop);
   const std::size_t slow = std::min(sampled.memory.size(), result.integrals.size());
   for (std::size_t i = 0; i < slow; ++i) {
     result.integrals[i] = std::log(sampled.memory[i]) / loop.period;

@@ -1,9 +1,6 @@
 #pragma once
-#include <dashpot/analysis/sampled_loop.hpp>
-#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/latest.hpp>
-#include <dashpot/controller/law/designed_damping.hpp>
-#include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/snapshot.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 
@@ -13,32 +10,9 @@
 
 namespace dashpot::controller {
 
-/// Returns dg/dq (n x n, N m/rad) of the gravity torque g(q), by central differences, with a
-/// relative error of 1e-9. Allocates.
-Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector& q);
-
-/// Motions slower than this, rad/s, do not count in a gain margin, because a self-motion fed by the
-/// compensation of gravity through a zero-order hold is no vibration.
-inline constexpr double kSlowestVibration = 1;
-
-/// Returns the sampled loop that the settings describe, without gravity, and without elastic
-/// joints; see analysis::SampledLoop::gears.
-analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings);
-
-/// Returns what designs the damping of springs for their ratios: as much of it as that loop bears
-/// with Limits::gain_margin and a reserve.
+/// Returns what designs the damping of springs for their ratios: as much of it as the sampled loop
+/// of the settings, without gravity and gears, bears with Limits::gain_margin and a reserve.
 DesignedDamping designed_damping(const RobotModel& model, const Settings& settings);
-
-/// Returns the integral of springs with this K_I (n x n, N m/(rad s), symmetric positive
-/// semidefinite; see integral_stiffness) as states of the loop, as many as its rank: with K_I = F
-/// F',
-///     w_k+1 = w_k + T F' q_k,   and the torque -F w_k.
-analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period);
-
-/// Returns that of the springs of an impedance at a posture, with the K_I of integral_stiffness; no
-/// states if `time` (Integral::time, s) is zero.
-analysis::ControllerMemory integral_memory(const DynamicsResult& robot, const Impedance& springs,
-                                           double time, double period);
 
 /// Returns at which rates, 1/s, the slow modes decay that the integral makes, the slowest first;
 /// negative: it grows.
@@ -85,14 +59,11 @@ class SampledAnalysis {
   void run() noexcept;
   void solve(const Task& task, SampledVibration& result);
 
-  DynamicsKernel kernel_;
-  const analysis::Gears elastic_;
-  bool gravity_;  ///< whether gravity is compensated
+  SampledArm arm_;
   std::uint64_t interval_;
   std::uint64_t first_;  ///< tick
   std::uint64_t next_;
   std::atomic<std::uint64_t> resets_{1};  ///< from 1, so that an empty result never matches
-  analysis::SampledLoop loop_;            ///< of the thread
   Latest<Task> tasks_;
   Latest<SampledVibration> results_;
   std::atomic<bool> stop_{false};

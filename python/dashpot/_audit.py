@@ -28,6 +28,8 @@ class PostureAudit(Result):
     """Real part of the fastest eigenvalue of the continuous loop, 1/s; negative if damped."""
     gain_margin: float
     """Factor by which stiffness and damping may grow together; NaN without a period."""
+    assumes: list[str]
+    """What the loop leaves out that the arm may have, such as "gravity ideal", "rotors unknown"."""
     singular: bool
     smallest_ratio_bound: float
     fastest_pole_bound: float
@@ -143,7 +145,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           directions: Sequence[str] = DIRECTIONS, half_quaternion: bool = False,
           inertia_blocks: bool = False, period: float = 0, delay: int = 0, cutoff: float = 0,
           difference_velocity: bool = False, integral_time: float = 0,
-          margin: float = 2, soft_frequency: float = 0.1,
+          ideal_gravity: bool = False, margin: float = 2, soft_frequency: float = 0.1,
           damping_ratio: float | None = None, samples: int = 0, seed: int = 0,
           lower: npt.ArrayLike | None = None, upper: npt.ArrayLike | None = None,
           postures: npt.ArrayLike | Mapping[str, Any] | None = None, outside_limits: bool = False,
@@ -168,7 +170,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     apart, with a `null_projector` of "kinematic" instead of "dynamic" null-space gains act through
     I - J^+ J. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
     (Hz; 0: none), `difference_velocity`, and an integral of the springs with `integral_time` (s; 0:
-    none), which counts in the gain margin alone. Where the robot has no reflected inertia, the posture tells
+    none), which counts in the gain margin alone. The torque against gravity is as late as the rest,
+    unless it is `ideal_gravity`, such as of a robot that holds itself. Where the robot has no reflected inertia, the posture tells
     how much would be enough for a gain margin of `margin`. Modes below `soft_frequency` (rad/s) are soft.
 
     An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
@@ -202,6 +205,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
                                "soft_frequency": float(soft_frequency)}
     if integral_time != 0:
         options["integral_time"] = float(integral_time)
+    if ideal_gravity:
+        options["ideal_gravity"] = True
     if margin != 2:
         options["margin"] = float(margin)
     for name, values in (("lower", lower), ("upper", upper)):

@@ -47,7 +47,7 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
                   outside_limits: bool = False, urdf_friction: bool = False,
                   period: float = 0, delay: int = 0, cutoff: float = 0,
                   difference_velocity: bool = False, integral_time: float = 0,
-                  gain_margin: float = 2,
+                  ideal_gravity: bool = False, gain_margin: float = 2,
                   executor: concurrent.futures.Executor | None = None) -> RegionDesign:
     """Returns one constant damping matrix for many postures, as `dashpot design --region` does.
 
@@ -58,7 +58,7 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
 
     With a `period` (s) the matrix is lowered as a whole to what the sampled loop of every posture
     bears with the `gain_margin`. The loop is that of `audit`: `delay` (ticks), `cutoff` (Hz),
-    `difference_velocity`, `integral_time` (s), but all motions count in its margin, soft ones too.
+    `difference_velocity`, `integral_time` (s), `ideal_gravity`.
 
     Only postures that bind are searched over. An `executor` of concurrent.futures judges all of
     them in chunks, where the workers are, and only the few that come off worst come back. The result
@@ -72,7 +72,8 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     """
     if (task_stiffness is None) == (joint_stiffness is None):
         raise Error("task_stiffness: give one of task_stiffness and joint_stiffness")
-    if not period and (delay or cutoff or difference_velocity or integral_time or gain_margin != 2):
+    if not period and (delay or cutoff or difference_velocity or integral_time or ideal_gravity
+                       or gain_margin != 2):
         raise Error("period: missing; the other numbers of a loop need it")
     gains = (to_gain("joint_stiffness", joint_stiffness), None, 0.0,
              to_gain("task_stiffness", task_stiffness), None, 0.0,
@@ -84,6 +85,7 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
                                "cutoff": float(cutoff),
                                "difference_velocity": bool(difference_velocity),
                                "integral_time": float(integral_time),
+                               "ideal_gravity": ideal_gravity,
                                "soft_frequency": float(soft_frequency)}
     for name, values in (("lower", lower), ("upper", upper)):
         if values is not None:

@@ -46,6 +46,9 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   if (given.contains("integral_time")) {
     options.integral_time = nb::cast<double>(given["integral_time"]);
   }
+  if (given.contains("ideal_gravity")) {
+    options.ideal_gravity = nb::cast<bool>(given["ideal_gravity"]);
+  }
   if (given.contains("margin")) options.margin = nb::cast<double>(given["margin"]);
   if (given.contains("lower")) {
     options.lower = robot.joint_vector("lower", nb::cast<Eigen::VectorXd>(given["lower"]));
@@ -140,6 +143,7 @@ nb::dict posture(const RobotAudit& all, const Eigen::VectorXd& q) {
   result["smallest_ratio_bound"] = found.smallest_ratio_bound;
   result["fastest_pole_bound"] = found.fastest_pole_bound;
   result["integral_decays"] = to_column(found.integral_decays, [](double decay) { return decay; });
+  result["assumes"] = loop_assumptions(all.audit.options(), &all.robot.model);
   const bool unknown = controller::unknown_rotors(all.robot.model).any();
   result["rotors"] = unknown ? "unknown" : "known";
   result["reflected_inertia_for_margin"] = nb::none();

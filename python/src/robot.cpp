@@ -62,19 +62,9 @@ analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, cons
   Settings settings = controller::default_settings(robot.model);
   settings.task_terms.load = load;
   settings.limits.gain_margin = 1;  // no loop is told that could lower a ratio
-  controller::PostureLoop loop(robot.model, settings);
-  analysis::System<controller::kMaxJoints> system;
-  const controller::Status status = loop.closed_loop(
-      q, gains, mode, system, wrench.value_or(Eigen::VectorXd(Eigen::VectorXd::Zero(6))));
-  if (status != controller::Status::kOk) {
-    throw std::invalid_argument(std::string("closed loop: ") + to_text(status));
-  }
-  analysis::System<> result(system.dof());
-  result.mass = system.mass;
-  result.damping = system.damping;
-  result.stiffness = system.stiffness;
-  result.stiffness_factor = system.stiffness_factor;
-  return result;
+  return controller::PostureLoop(robot.model, settings)
+      .at(q, gains, mode, wrench.value_or(Eigen::VectorXd(Eigen::VectorXd::Zero(6))))
+      .system;
 }
 
 nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& gains,

@@ -109,15 +109,12 @@ TEST_F(AuditOfPanda, TakesAnotherLoopAndTellsItsOwnMatrices) {
   gains.null_damping_ratio = 0;
   gains.null_stiffness.setZero(7);
   gains.null_damping.setZero(7);
-  analysis::System<kMaxJoints> designed;
-  PostureLoop loop(model, settings);
-  ASSERT_EQ(loop.closed_loop(panda_ready(), gains, Mode::kCartesian, designed), Status::kOk);
-  const std::optional<PostureNumbers> numbers = audit.numbers(panda_ready(), designed);
+  LoopAt designed = PostureLoop(model, settings).at(panda_ready(), gains, Mode::kCartesian);
+  const std::optional<PostureNumbers> numbers = audit.numbers(designed);
   ASSERT_TRUE(numbers);
-  expect_numbers(*numbers,
-                 testing::system_from(designed.mass, designed.damping, designed.stiffness));
-  designed.stiffness_factor.resize(0, 7);
-  EXPECT_FALSE(audit.numbers(panda_ready(), designed));
+  expect_numbers(*numbers, designed.system);
+  designed.system.stiffness_factor.resize(0, 7);
+  EXPECT_FALSE(audit.numbers(designed));
 
   const TaskLoop own = analysis::to_joint_space(audit.impedance(panda_ready()));
   expect_numbers(audit.numbers(panda_ready()), own);

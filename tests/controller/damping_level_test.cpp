@@ -28,11 +28,11 @@ double margin_of(const LedArm& arm, double wanted) {
   const Settings& settings = arm.controller.settings();
   analysis::System<kMaxJoints> system;
   arm.controller.closed_loop(system);
-  analysis::SampledLoop loop = sampled_loop(arm.model, settings);
-  loop.gravity_gradient = gravity_gradient(DynamicsKernel(arm.model), arm.state.position);
+  const analysis::SampledLoop loop =
+      SampledArm(arm.model, timing_of(settings)).at(arm.state.position);
   analysis::Spectrum<kMaxJoints> spectrum;
   analysis::SpectrumSolver<kMaxJoints>().solve(system, spectrum);
-  return gain_margin(system, spectrum, loop, 1.2 * wanted, kSlowestVibration);
+  return gain_margin(system, spectrum, loop, 1.2 * wanted);
 }
 
 /// Nothing interferes, and gains are in force at once.

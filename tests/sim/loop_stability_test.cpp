@@ -2,6 +2,7 @@
 // 2 % inside the boundary settle, 2 % outside they do not.
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
@@ -111,6 +112,11 @@ TEST_P(ArmStability, TurnsWhereTheAnalysisSays) {
     const double margin = gain_margin(arm->closed_loop, spectrum_of(arm->closed_loop), loop);
     ASSERT_GT(margin, 1);
     ASSERT_TRUE(std::isfinite(margin));
+    controller::Settings settings = release_settings(twin, gains, loop.period);
+    settings.analysis.sampled = {0, loop.delay, loop.torque_cutoff, false};
+    const auto [system, sampled_as] =
+        controller::PostureLoop(twin.model, settings).at(q0, gains, settings.initial.mode);
+    EXPECT_NEAR(gain_margin(system, analyze(system), sampled_as), margin, 1e-5 * margin);
     for (const double factor : {0.98, 1.02}) {
       release(factor * margin, arm, keep);
       const analysis::SampledSpectrum sampled =

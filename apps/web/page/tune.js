@@ -265,6 +265,7 @@ function loopWords(name, found) {
   return [unstable(found) && `${name} is unstable in the sampled loop, so that its ratios and its motion are none that an arm would show`,
     level && !level.kept && `No share of the ratio of ${name} leaves the loop the margin asked for: its springs are too stiff, or the ratio too small for them`,
     level && level.share < 0.995 && `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % where the loop bears least`,
+    found.assumes.length > 0 && `The loop of ${name} assumes: ${found.assumes.join(', ')}`,
     limit && `${name} is limited by a motion at ${number(limit.frequency, 3)} rad/s${limit.joint ? `, most of it in ${limit.joint}` : ''}`].filter(Boolean);
 }
 
