@@ -26,35 +26,41 @@ MatrixXd checked(const MatrixXd& A, Index n, const char* name) {
   return A;
 }
 
-/// phi_0, phi_1 and phi_2 of a real matrix, see phi.
-struct RealPhi {
-  MatrixXd zero, one, two;
-};
-
-/// Taylor series of Z / 2^s, and doubling.
-RealPhi real_phi(const MatrixXd& Z) {
-  const auto identity = MatrixXd::Identity(Z.rows(), Z.cols());
-  double norm = Z.cwiseAbs().colwise().sum().maxCoeff();
-  if (!std::isfinite(norm)) throw std::invalid_argument("sample_loop: the friction is too large");
-  const int doublings = norm < 1 ? 0 : std::ilogb(norm) + 1;
-  norm = std::ldexp(norm, -doublings);
-  int terms = 0;
-  for (double term = 0.5; term > 1e-17; term *= norm / (2 + ++terms)) {
+/// Returns (y, y') after a tick from (y, y', f), 2n x 3n, of y'' = -G y - D y' + f. The motion y =
+/// V1 from y' = I is a Taylor series over the tick / 2^s, which is doubled; V0 is its velocity and
+/// V2 its integral. From y = I it is I - V2 G, and constant f moves by V2.
+MatrixXd motion_of_tick(const MatrixXd& G, const MatrixXd& D) {
+  const auto norm = [](const MatrixXd& A) {
+    return A.size() == 0 ? 0.0 : A.cwiseAbs().colwise().sum().maxCoeff();
+  };
+  const double size = std::max(norm(D), std::sqrt(norm(G)));
+  if (!std::isfinite(size)) throw std::invalid_argument("sample_loop: the friction is too large");
+  const int doublings = size < 0.5 ? 0 : std::ilogb(size) + 2;
+  const double t = std::ldexp(1.0, -doublings);
+  const MatrixXd identity = MatrixXd::Identity(G.rows(), G.cols());
+  const bool damped = !D.isZero(0);
+  MatrixXd V0 = identity, V1 = t * identity, V2 = 0.5 * t * t * identity;
+  MatrixXd before = 0 * identity, term = V1, next;  // of V1
+  double largest = t;  // of a term: they fall like powers of the golden ratio times `size`
+  for (int k = 2; (largest *= std::numbers::phi * size * t / k) > 1e-18 * t; ++k) {
+    next = -t * t / (k * (k - 1.0)) * G.lazyProduct(before);
+    if (damped) next -= t / k * D.lazyProduct(term);
+    V0 += k / t * next;
+    V1 += next;
+    V2 += t / (k + 1) * next;
+    before.swap(term);
+    term.swap(next);
   }
-  const MatrixXd scaled = std::ldexp(1.0, -doublings) * Z;
-  RealPhi phi{{}, {}, identity};
-  for (int j = terms; j > 0; --j) {
-    phi.two = (identity + scaled.lazyProduct(phi.two) / (2.0 + j)).eval();
-  }
-  phi.two *= 0.5;
-  phi.one = identity + scaled.lazyProduct(phi.two);
-  phi.zero = identity + scaled.lazyProduct(phi.one);
   for (int i = 0; i < doublings; ++i) {
-    phi.two = (0.25 * phi.one.lazyProduct(phi.one) + 0.5 * phi.two).eval();
-    phi.one = (0.5 * phi.zero.lazyProduct(phi.one) + 0.5 * phi.one).eval();
-    phi.zero = phi.zero.lazyProduct(phi.zero).eval();
+    const MatrixXd Y0 = identity - V2 * G, square = V1 * V1;
+    V2 = (V2 + Y0 * V2 + square).eval();
+    const MatrixXd twice = Y0 * V1 + V1 * V0;
+    V0 = (V0 * V0 - V1 * G * V1).eval();
+    V1 = twice;
   }
-  return phi;
+  MatrixXd motion(2 * G.rows(), 3 * G.rows());
+  motion << identity - V2 * G, V1, V2, -V1 * G, V0, V1;
+  return motion;
 }
 
 }  // namespace
@@ -185,17 +191,7 @@ void SampledDataModel::integrate() {
   const MatrixXd uncompensated = (G - P - H) * zero_modes;
   if (uncompensated.norm() > 1e-10 * (G.norm() + H.norm())) zero_modes.resize(n, 0);
   span_commands();
-  motion = MatrixXd::Zero(2 * n, 3 * n);
-  if (G.isZero(0)) {  // masses and friction alone
-    const auto [zero, one, two] = real_phi(-D);
-    motion << MatrixXd::Identity(n, n), one, two, MatrixXd::Zero(n, n), zero, one;
-    return;
-  }
-  MatrixXd rate = MatrixXd::Zero(2 * n, 2 * n);  // of (y, y')
-  rate.block(0, n, n, n).setIdentity();
-  rate.bottomRows(n) << -G, -D;
-  const auto [zero, one, two] = real_phi(rate);
-  motion << zero, one.rightCols(n);
+  motion = motion_of_tick(G, D);
 }
 
 void SampledDataModel::span_commands() {
