@@ -10,9 +10,13 @@ struct RobotDescription {
   std::string urdf;  ///< path
   std::string base, tip;
   ModelOptions options;
+  std::string text = {};  ///< of the URDF where it is known; empty: it is read from the file
 
   /// Returns the model. Throws InvalidModel.
-  RobotModel model() const { return RobotModel::from_urdf_file(urdf, base, tip, options); }
+  RobotModel model() const {
+    return text.empty() ? RobotModel::from_urdf_file(urdf, base, tip, options)
+                        : RobotModel::from_urdf_text(text, base, tip, options, urdf);
+  }
 };
 
 }  // namespace dashpot::controller

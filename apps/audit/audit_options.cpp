@@ -52,13 +52,7 @@ void read_gains_file(const std::string& path, const RobotModel& model, AuditOpti
   const controller::YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
   const controller::YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("gains")) throw InputError("gains", "missing");
-  controller::Gains& gains = audit.gains;
-  const int n = model.dof();
-  gains.joint_stiffness.setZero(n, n);
-  gains.joint_damping.setZero(n, n);
-  gains.null_stiffness.setZero(n);
-  gains.null_damping.setZero(n);
-  controller::read_gains(root, model, controller::GainPairs::kEither, gains);
+  const controller::Gains& gains = audit.gains = controller::read_gains(root, model);
   if (gains.joint_damping_ratio > 0 || gains.task_damping_ratio > 0 ||
       gains.null_damping_ratio > 0) {
     throw InputError("gains",

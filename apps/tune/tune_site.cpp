@@ -4,6 +4,7 @@
 #include <dashpot/apps/tune/tuned_loop.hpp>
 #include <dashpot/apps/web/arm_view.hpp>
 #include <dashpot/apps/web/web_site.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/rotors.hpp>
 
 #include <array>
@@ -12,6 +13,7 @@
 #include <filesystem>
 #include <random>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -61,6 +63,17 @@ TunePage presets_json(int n) {
 const TunePage& wanted(const TunePage& asked, const char* key) {
   if (!asked.is_object() || !asked.contains(key)) throw InputError(key, "missing");
   return asked[key];
+}
+
+controller::JointVector posture(const TunePage& told, const controller::RobotModel& model) {
+  static constexpr std::array<std::string_view, 1> kKeys = {"q"};
+  const controller::YamlNode document = yaml_of({{"q", told}});
+  const controller::YamlMapping keys(document, "", kKeys);
+  if (!keys.has("q")) throw keys.error("q", "missing");
+  controller::JointVector q(model.dof());
+  controller::read_numbers(keys, "q", controller::joint_units(model, "rad", "m"), {-1e9, true, 1e9},
+                           q);
+  return q;
 }
 
 std::int64_t whole_number(const TunePage& asked, const char* key, std::int64_t most) {
@@ -144,7 +157,7 @@ TunePage TuneSite::answer(const std::string& path, const TunePage& asked) {
   }
   const TunePage& place = wanted(asked, "place");
   if (!place.is_string()) throw InputError("place", "has to be a text");
-  const controller::JointVector q = read_numbers("q", wanted(asked, "q"), arm.model().dof());
+  const controller::JointVector q = posture(wanted(asked, "q"), arm.model());
   TunePage result = TunedLoop(arm, design).at(q, place.get<std::string>());
   result["refused"] = refusals(arm, design, q);
   return result;

@@ -1,16 +1,16 @@
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/tune/tuned_design.hpp>
+#include <dashpot/controller/config/config_gains.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/model/urdf_tree.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <fstream>
-#include <initializer_list>
-#include <limits>
-#include <sstream>
 #include <string_view>
+#include <utility>
 
 namespace dashpot::apps {
 namespace {
@@ -18,98 +18,84 @@ namespace {
 using controller::InputError;
 using controller::JointVector;
 using controller::Mode;
+using controller::Range;
+using controller::YamlMapping;
+using controller::YamlNode;
 using TuneJson = nlohmann::ordered_json;
 
-std::string text_of(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) {
-    throw controller::InvalidModel(path + ": cannot be read");
-  }
-  return text.str();
+/// With the text of the URDF, so that each arm is made from the same.
+controller::RobotDescription with_text(controller::RobotDescription robot) {
+  if (robot.text.empty()) robot.text = controller::read_text(robot.urdf);
+  return robot;
 }
 
-constexpr double kMostDelay = 20;  ///< ticks, as for the controller; more takes seconds
+constexpr int kMostDelay = 20;          // ticks, as for the controller; more takes seconds
+constexpr double kMostPayload = 1e3;    // kg
+constexpr Range kMargin{1, true, 1e6};  // of gain
+constexpr Range kUpToMillion{0, true, 1e6};
 
-/// Refuses other keys than these.
-void check_keys(const std::string& of, const TuneJson& object,
-                std::initializer_list<std::string_view> keys) {
-  if (!object.is_object()) throw InputError(of, "is no object");
-  for (const auto& [key, value] : object.items()) {
-    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-      throw InputError(std::string(of).append(".").append(key), "is no key");
+template <class Value>
+using Choices = std::array<std::pair<std::string_view, Value>, 2>;
+
+/// Null stands for a key that is missing, or, in a list, for none.
+TuneJson without_nulls(TuneJson json, int depth = 0) {
+  constexpr int kDeepest = 8;  // a design has four levels
+  if (!json.is_structured()) return json;
+  if (depth > kDeepest) throw controller::InputError("", "lists are nested too deeply");
+  for (auto at = json.begin(); at != json.end();) {
+    if (at->is_null() && json.is_object()) {
+      at = json.erase(at);
+      continue;
     }
+    *at = at->is_null() ? TuneJson("none") : without_nulls(*at, depth + 1);
+    ++at;
   }
+  return json;
 }
 
-/// The value of a key, or null.
-const TuneJson& value_at(const TuneJson& object, const char* key) {
-  static const TuneJson none;
-  const auto found = object.find(key);
-  return found == object.end() ? none : *found;
-}
-
-double read_number(const std::string& key, const TuneJson& value, double low, double high) {
-  const double number = value.is_number() ? value.get<double>() : std::nan("");
-  if (!std::isfinite(number) || number < low || number > high) {
-    std::ostringstream range;
-    range << "has to be a number from " << low << " to " << high;
-    throw InputError(key, range.str());
+/// Returns the gains of one part as a configuration has them. {"ratio": Z} is its damping_ratio;
+/// F of {"factor": F}, of sqrt(stiffness), is left to `factor`.
+TuneJson part_of(const TuneJson& design, const char* stiffness, const char* damping,
+                 double& factor) {
+  static constexpr std::array<std::string_view, 2> kKeys = {"factor", "ratio"};
+  TuneJson part = TuneJson::object();
+  if (design.contains(stiffness)) part["stiffness"] = design[stiffness];
+  if (!design.contains(damping)) return part;
+  const TuneJson& given = design[damping];
+  if (!given.is_object()) {
+    part["damping"] = given;
+    return part;
   }
-  return number;
-}
-
-double number_at(const TuneJson& object, const char* key, double low, double high, double other) {
-  const TuneJson& value = value_at(object, key);
-  return value.is_null() ? other : read_number(key, value, low, high);
-}
-
-bool flag_at(const TuneJson& object, const char* key) {
-  const TuneJson& value = value_at(object, key);
-  if (!value.is_null() && !value.is_boolean()) throw InputError(key, "has to be true or false");
-  return value.is_boolean() && value.get<bool>();
-}
-
-/// Whether the value of a key is the second of two words; the first is the default.
-bool second_at(const TuneJson& object, const char* key, const char* first, const char* second) {
-  const TuneJson& value = value_at(object, key);
-  if (value.is_null() || value == first) return false;
-  if (value != second) {
-    throw InputError(key, std::string("has to be ") + first + " or " + second);
+  const YamlNode document = yaml_of(given);
+  const YamlMapping keys(document, std::string(damping) + ".", kKeys);
+  if (keys.has("ratio")) {
+    part["damping_ratio"] = given["ratio"];
+    return part;
   }
-  return true;
+  if (!keys.has("factor")) throw keys.error("factor", "missing");
+  read_number(keys, "factor", "", kUpToMillion, factor);
+  return part;
 }
 
-/// A matrix as its diagonal or as its rows, k x k.
-Eigen::MatrixXd read_gain_matrix(const std::string& key, const TuneJson& value, Eigen::Index k) {
-  if (value.is_array() && !value.empty() && value.front().is_array()) {
-    if (static_cast<Eigen::Index>(value.size()) != k) {
-      throw InputError(key, "has to have " + std::to_string(k) + " rows");
-    }
-    Eigen::MatrixXd matrix(k, k);
-    for (Eigen::Index i = 0; i < k; ++i) {
-      matrix.row(i) = read_numbers(key, value[static_cast<std::size_t>(i)], k).transpose();
-    }
-    return matrix;
-  }
-  return Eigen::MatrixXd(read_numbers(key, value, k).asDiagonal());
+/// Returns F sqrt(K), entry by entry, as an audit has it.
+template <class Matrix>
+Matrix of_root(double factor, const Matrix& K) {
+  return factor * K.cwiseMax(0).cwiseSqrt();
 }
 
-/// {"factor": F} of sqrt(stiffness), {"ratio": Z}, or a matrix. Returns the ratio, or 0.
-double read_damping(const std::string& key, const TuneJson& value, const Eigen::MatrixXd& K,
-                    Eigen::MatrixXd& damping) {
-  damping.setZero(K.rows(), K.cols());
-  if (!value.is_object()) {
-    if (!value.is_null()) damping = read_gain_matrix(key, value, K.rows());
-    return 0;
-  }
-  check_keys(key, value, {"factor", "ratio"});
-  if (value.contains("ratio")) {
-    return read_number(key + ".ratio", value["ratio"], 1e-6, controller::kLargestDampingRatio);
-  }
-  const double factor = read_number(key + ".factor", value_at(value, "factor"), 0, 1e6);
-  damping = (factor * K.cwiseMax(0).cwiseSqrt()).eval();  // entry by entry, as an audit has it
-  return 0;
+controller::Gains gains_of(const TuneJson& design, const controller::RobotModel& model) {
+  static constexpr std::array<std::string_view, 1> kKeys = {"gains"};
+  double task = 0, joint = 0, null_space = 0;
+  TuneJson parts = {{"task", part_of(design, "stiffness", "damping", task)},
+                    {"joint", part_of(design, "joint_stiffness", "joint_damping", joint)},
+                    {"null_space", part_of(design, "null_stiffness", "null_damping", null_space)}};
+  if (design.contains("frame")) parts["task"]["frame"] = design["frame"];
+  const YamlNode document = yaml_of({{"gains", parts}});
+  controller::Gains gains = controller::read_gains({document, "", kKeys}, model);
+  if (task > 0) gains.task_damping = of_root(task, gains.task_stiffness);
+  if (joint > 0) gains.joint_damping = of_root(joint, gains.joint_stiffness);
+  if (null_space > 0) gains.null_damping = of_root(null_space, gains.null_stiffness);
+  return gains;
 }
 
 TuneJson matrix_json(const Eigen::MatrixXd& matrix) {
@@ -189,73 +175,27 @@ TuneJson robot_keys(const controller::RobotDescription& robot) {
   return keys;
 }
 
-JointVector read_numbers(const std::string& key, const TuneJson& list, Eigen::Index n) {
-  if (!list.is_array() || static_cast<Eigen::Index>(list.size()) != n) {
-    throw InputError(key, "has to be a list of " + std::to_string(n) + " numbers");
-  }
-  JointVector values(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    values[i] = read_number(key, list[static_cast<std::size_t>(i)], -1e9, 1e9);
-  }
-  return values;
+YamlNode yaml_of(const TuneJson& json) {
+  return controller::parse_made_yaml(without_nulls(json).dump());
 }
 
-TunedArm::TunedArm(const controller::RobotDescription& robot, const controller::Settings* settings)
-    : TunedArm(robot, text_of(robot.urdf), settings) {}
-
-TunedArm::TunedArm(controller::RobotDescription robot, std::string urdf,
-                   const controller::Settings* settings)
-    : robot_(std::move(robot)),
-      urdf_(std::move(urdf)),
-      model_(controller::RobotModel::from_urdf_text(urdf_, robot_.base, robot_.tip, robot_.options,
-                                                    robot_.urdf)),
+TunedArm::TunedArm(controller::RobotDescription robot, const controller::Settings* settings)
+    : robot_(with_text(std::move(robot))),
+      model_(robot_.model()),
       settings_(settings != nullptr ? *settings : controller::default_settings(model_)),
       own_settings_(settings != nullptr) {}
 
 TunedArm TunedArm::with(const TuneJson& parts) const {
-  check_keys("arm", parts,
-             {"payload", "reflected_inertia", "viscous_friction", "gear_stiffness", "gear_damping",
-              "position_sensor"});
+  static constexpr std::array<std::string_view, 6> kKeys = {"payload",          "reflected_inertia",
+                                                            "viscous_friction", "gear_stiffness",
+                                                            "gear_damping",     "position_sensor"};
+  const YamlNode document = yaml_of(parts);
+  const YamlMapping keys(document, "arm.", kKeys);
   controller::RobotDescription robot = robot_;
-  controller::ModelOptions& options = robot.options;
-  const int n = model_.dof();
-  if (const TuneJson& payload = value_at(parts, "payload"); !payload.is_null()) {
-    check_keys("payload", payload, {"mass", "center", "inertia"});
-    options.payload = {};
-    options.payload.mass = number_at(payload, "mass", 0, 1e3, 0);
-    if (payload.contains("center")) {
-      options.payload.center = read_numbers("payload.center", payload["center"], 3);
-    }
-    if (payload.contains("inertia")) {
-      options.payload.inertia = read_gain_matrix("payload.inertia", payload["inertia"], 3);
-    }
-  }
-  const auto take = [&](const char* key, JointVector& values) {
-    const TuneJson& list = value_at(parts, key);
-    if (list.is_null()) return;
-    values = read_numbers(key, list, n);
-    if (values.minCoeff() < 0) throw InputError(key, "a number is negative");
-  };
-  take("reflected_inertia", options.reflected_inertia);
-  take("viscous_friction", options.viscous_friction);
-  take("gear_damping", options.gear_damping);
-  if (const TuneJson& list = value_at(parts, "gear_stiffness"); !list.is_null()) {
-    TuneJson numbers = list;
-    if (numbers.is_array()) {
-      for (TuneJson& one : numbers) one = one.is_null() ? TuneJson(0.0) : one;
-    }
-    options.gear_stiffness = read_numbers("gear_stiffness", numbers, n);
-    for (double& one : options.gear_stiffness) {
-      if (one < 0) throw InputError("gear_stiffness", "a number is negative");
-      if (one == 0) one = std::numeric_limits<double>::infinity();
-    }
-  }
-  if (!value_at(parts, "position_sensor").is_null()) {
-    options.position_sensor = second_at(parts, "position_sensor", "motor", "link")
-                                  ? controller::PositionSensor::kLink
-                                  : controller::PositionSensor::kMotor;
-  }
-  return {robot, urdf_, own_settings_ ? &settings_ : nullptr};
+  if (keys.has("payload")) robot.options.payload = {};
+  controller::read_joint_options(keys, model_, robot.options);
+  if (robot.options.payload.mass > kMostPayload) throw keys.error("payload", "is too heavy");
+  return {std::move(robot), own_settings_ ? &settings_ : nullptr};
 }
 
 bool TunedDesign::designed() const {
@@ -265,50 +205,48 @@ bool TunedDesign::designed() const {
 }
 
 TunedDesign read_design(const TunedArm& arm, const TuneJson& design) {
-  check_keys("design", design,
-             {"mode", "frame", "stiffness", "damping", "joint_stiffness", "joint_damping",
-              "null_stiffness", "null_damping", "null_projector", "rotation", "inertia_blocks",
-              "period", "delay", "cutoff", "difference_velocity", "integral_time", "ideal_gravity",
-              "gain_margin", "arm"});
+  static constexpr std::array<std::string_view, 19> kKeys = {"mode",
+                                                             "frame",
+                                                             "stiffness",
+                                                             "damping",
+                                                             "joint_stiffness",
+                                                             "joint_damping",
+                                                             "null_stiffness",
+                                                             "null_damping",
+                                                             "null_projector",
+                                                             "rotation",
+                                                             "inertia_blocks",
+                                                             "period",
+                                                             "delay",
+                                                             "cutoff",
+                                                             "difference_velocity",
+                                                             "integral_time",
+                                                             "ideal_gravity",
+                                                             "gain_margin",
+                                                             "arm"};
+  const YamlNode document = yaml_of(design);
+  const YamlMapping keys(document, "", kKeys);
   TunedDesign result;
   controller::AuditOptions& stated = result.stated;
-  controller::Gains& gains = stated.gains;
-  const int n = arm.model().dof();
-  stated.mode = second_at(design, "mode", "cartesian", "joint") ? Mode::kJoint : Mode::kCartesian;
-  if (second_at(design, "frame", "base", "tool")) gains.frame = controller::Frame::kTool;
-  stated.half_quaternion = second_at(design, "rotation", "vector", "half-quaternion");
-  stated.kinematic_null_space = second_at(design, "null_projector", "dynamic", "kinematic");
-  stated.inertia_blocks = flag_at(design, "inertia_blocks");
-  Eigen::MatrixXd damping;
-  if (const TuneJson& K = value_at(design, "stiffness"); !K.is_null()) {
-    gains.task_stiffness = read_gain_matrix("stiffness", K, 6);
-  }
-  gains.task_damping_ratio =
-      read_damping("damping", value_at(design, "damping"), gains.task_stiffness, damping);
-  gains.task_damping = damping;
-  gains.joint_stiffness.setZero(n, n);
-  if (const TuneJson& K = value_at(design, "joint_stiffness"); !K.is_null()) {
-    gains.joint_stiffness = read_gain_matrix("joint_stiffness", K, n);
-  }
-  gains.joint_damping_ratio = read_damping("joint_damping", value_at(design, "joint_damping"),
-                                           gains.joint_stiffness, damping);
-  gains.joint_damping = damping;
-  gains.null_stiffness.setZero(n);
-  if (const TuneJson& K = value_at(design, "null_stiffness"); !K.is_null()) {
-    gains.null_stiffness = read_numbers("null_stiffness", K, n);
-  }
-  gains.null_damping_ratio = read_damping("null_damping", value_at(design, "null_damping"),
-                                          gains.null_stiffness.asDiagonal(), damping);
-  gains.null_damping = damping.diagonal();
-  stated.period = number_at(design, "period", 0, 1, arm.settings().period);
-  const double delay = number_at(design, "delay", 0, kMostDelay, 0);
-  stated.delay = static_cast<int>(delay);
-  if (stated.delay != delay) throw InputError("delay", "must be whole ticks");
-  stated.cutoff = number_at(design, "cutoff", 0, 1e6, 0);
-  stated.difference_velocity = flag_at(design, "difference_velocity");
-  stated.integral_time = number_at(design, "integral_time", 0, 1e6, 0);
-  stated.ideal_gravity = flag_at(design, "ideal_gravity");
-  stated.margin = number_at(design, "gain_margin", 1, 1e6, arm.settings().limits.gain_margin);
+  stated.gains = gains_of(without_nulls(design), arm.model());
+  read_choice(keys, "mode",
+              Choices<Mode>{{{"cartesian", Mode::kCartesian}, {"joint", Mode::kJoint}}},
+              stated.mode);
+  read_choice(keys, "rotation", Choices<bool>{{{"vector", false}, {"half-quaternion", true}}},
+              stated.half_quaternion);
+  read_choice(keys, "null_projector", Choices<bool>{{{"dynamic", false}, {"kinematic", true}}},
+              stated.kinematic_null_space);
+  read_switch(keys, "inertia_blocks", stated.inertia_blocks);
+  stated.period = arm.settings().period;
+  read_number(keys, "period", "s", {0, true, 1}, stated.period);
+  read_count(keys, "delay", 0, stated.delay);
+  if (stated.delay > kMostDelay) throw keys.error("delay", "is longer than 20 ticks");
+  read_number(keys, "cutoff", "Hz", kUpToMillion, stated.cutoff);
+  read_switch(keys, "difference_velocity", stated.difference_velocity);
+  read_number(keys, "integral_time", "s", kUpToMillion, stated.integral_time);
+  read_switch(keys, "ideal_gravity", stated.ideal_gravity);
+  stated.margin = arm.settings().limits.gain_margin;
+  read_number(keys, "gain_margin", "", kMargin, stated.margin);
   if (result.designed() && (stated.kinematic_null_space || stated.inertia_blocks)) {
     throw InputError("damping",
                      "is designed for a ratio by Dashpot's controller alone, which has neither a "

@@ -2,6 +2,7 @@
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/robot_description.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/yaml/yaml_document.hpp>
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,7 +13,7 @@ namespace dashpot::apps {
 class TunedArm {
  public:
   /// The settings of a configuration, or null: default settings. Throws controller::InvalidModel.
-  TunedArm(const controller::RobotDescription& robot, const controller::Settings* settings);
+  TunedArm(controller::RobotDescription robot, const controller::Settings* settings);
 
   const controller::RobotDescription& robot() const { return robot_; }
   /// Returns the model and the settings as given.
@@ -27,13 +28,9 @@ class TunedArm {
 
  private:
   controller::RobotDescription robot_;
-  std::string urdf_;  ///< text
   controller::RobotModel model_;
   controller::Settings settings_;
   bool own_settings_;
-
-  TunedArm(controller::RobotDescription robot, std::string urdf,
-           const controller::Settings* settings);
 };
 
 /// Gains on an arm in a loop, as the page tells them.
@@ -56,8 +53,8 @@ nlohmann::ordered_json design_json(const TunedArm& arm);
 /// a configuration has in `robot`; a key that has its default is missing.
 nlohmann::ordered_json robot_keys(const controller::RobotDescription& robot);
 
-/// Reads n finite numbers. Throws InputError.
-controller::JointVector read_numbers(const std::string& key, const nlohmann::ordered_json& list,
-                                     Eigen::Index n);
+/// Returns JSON as YAML, which it is but for null: that stands for a key that is missing, or, in a
+/// list, for none.
+controller::YamlNode yaml_of(const nlohmann::ordered_json& json);
 
 }  // namespace dashpot::apps

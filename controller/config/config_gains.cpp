@@ -84,4 +84,13 @@ void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pa
   read_ratio(null_space, gains.null_damping_ratio);
 }
 
+Gains read_gains(const YamlMapping& parent, const RobotModel& model) {
+  const int n = model.dof();
+  Gains gains;
+  gains.joint_stiffness = gains.joint_damping = JointMatrix::Zero(n, n);
+  gains.null_stiffness = gains.null_damping = JointVector::Zero(n);
+  read_gains(parent, model, GainPairs::kEither, gains);
+  return gains;
+}
+
 }  // namespace dashpot::controller

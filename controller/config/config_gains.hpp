@@ -13,4 +13,8 @@ enum class GainPairs { kTogether, kEither };
 /// possible is not checked. Throws InputError.
 void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pairs, Gains& gains);
 
+/// Returns the gains under the key `gains` of `parent`, one without the other. What is missing is
+/// zero. Throws InputError.
+Gains read_gains(const YamlMapping& parent, const RobotModel& model);
+
 }  // namespace dashpot::controller

@@ -69,7 +69,7 @@ void read_gears(const YamlMapping& keys, const RobotModel& model, ModelOptions& 
                     options.gear_stiffness, kPositive, std::numeric_limits<double>::infinity());
   read_joint_option(keys, "gear_damping", joint_units(model, "N m s/rad", "N s/m"),
                     options.gear_damping);
-  if (keys.has("gear_damping") && !keys.has("gear_stiffness")) {
+  if (keys.has("gear_damping") && options.gear_stiffness.size() == 0) {
     throw keys.error("gear_damping", "needs gear_stiffness, N m/rad");
   }
   read_choice(keys, "position_sensor",
@@ -106,7 +106,19 @@ Units joint_units(const RobotModel& model, const char* revolute, const char* pri
   return units;
 }
 
-RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory) try {
+void read_joint_options(const YamlMapping& keys, const RobotModel& model, ModelOptions& options) {
+  read_payload(keys, options.payload);
+  const Units damping = joint_units(model, "N m s/rad", "N s/m");
+  read_joint_option(keys, "reflected_inertia", joint_units(model, "kg m^2", "kg"),
+                    options.reflected_inertia);
+  read_joint_option(keys, "viscous_friction", damping, options.viscous_friction);
+  read_joint_option(keys, "coulomb_friction", joint_units(model, "N m", "N"),
+                    options.coulomb_friction);
+  read_gears(keys, model, options);
+}
+
+RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory,
+                            const std::string& text) try {
   static constexpr std::array<std::string_view, 17> kKeys = {"urdf",
                                                              "base",
                                                              "tip",
@@ -129,6 +141,7 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
   robot.urdf = directory / required_text(root, keys, "urdf");
   robot.base = required_text(root, keys, "base");
   robot.tip = required_text(root, keys, "tip");
+  robot.text = text;
   ModelOptions& options = robot.options;
   read_vector3(keys, "gravity", "m/s^2", options.gravity);
   read_switch(keys, "include_off_chain", options.include_off_chain);
@@ -149,13 +162,7 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
     options.viscous_friction = model.joint_values(&Joint::viscous_friction);
     options.coulomb_friction = model.joint_values(&Joint::coulomb_friction);
   }
-  const Units damping = joint_units(model, "N m s/rad", "N s/m");
-  read_joint_option(keys, "reflected_inertia", joint_units(model, "kg m^2", "kg"),
-                    options.reflected_inertia);
-  read_joint_option(keys, "viscous_friction", damping, options.viscous_friction);
-  read_joint_option(keys, "coulomb_friction", joint_units(model, "N m", "N"),
-                    options.coulomb_friction);
-  read_gears(keys, model, options);
+  read_joint_options(keys, model, options);
   robot.model();  // throws what is wrong with it
   return robot;
 } catch (const InvalidModel& error) {

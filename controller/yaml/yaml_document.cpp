@@ -196,4 +196,14 @@ YamlNode parse_yaml(const std::string& text) {
   }
 }
 
+YamlNode parse_made_yaml(const std::string& text) {
+  const auto forget_lines = [](const auto& self, YamlNode& node) -> void {
+    node.line = 0;
+    for (YamlNode& item : node.items) self(self, item);
+  };
+  YamlNode document = parse_yaml(text);
+  forget_lines(forget_lines, document);
+  return document;
+}
+
 }  // namespace dashpot::controller

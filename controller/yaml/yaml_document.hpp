@@ -23,5 +23,7 @@ std::string read_regular_file(const std::string& path);
 /// Parses text that holds one YAML (or JSON) document. Throws InputError on anything else, and on
 /// text that is too large or too deeply nested to be what Dashpot reads.
 YamlNode parse_yaml(const std::string& text);
+/// The same, of text that a program made: errors name no lines.
+YamlNode parse_made_yaml(const std::string& text);
 
 }  // namespace dashpot::controller

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ._core import Error
-from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
-from ._robot import DIRECTIONS, Robot, check_postures, is_tool, selected
+from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers
+from ._robot import DIRECTIONS, Robot, check_postures, gains_text, selected
 from ._workers import Task, chunks_of, collect, workers
 
 
@@ -194,21 +194,17 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
         keep = np.outer(chosen, chosen)
         stiffness = None if stiffness is None else stiffness * keep
         damping = None if damping is None else damping * keep
-    gains = (to_gain("joint_stiffness", joint_stiffness),
-             _damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"), 0.0,
-             stiffness, damping, 0.0, to_vector("null_stiffness", null_stiffness),
-             to_vector("null_damping", null_damping), 0.0, is_tool(frame), [True] * 6)
+    gains = gains_text(
+        joint_stiffness=joint_stiffness, task_stiffness=stiffness, task_damping=damping,
+        joint_damping=_damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"),
+        null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
                                "kinematic_null_space": null_projector == "kinematic",
                                "period": float(period), "delay": delay, "cutoff": float(cutoff),
                                "difference_velocity": difference_velocity,
+                               "integral_time": float(integral_time),
+                               "ideal_gravity": ideal_gravity, "margin": float(margin),
                                "soft_frequency": float(soft_frequency)}
-    if integral_time != 0:
-        options["integral_time"] = float(integral_time)
-    if ideal_gravity:
-        options["ideal_gravity"] = True
-    if margin != 2:
-        options["margin"] = float(margin)
     for name, values in (("lower", lower), ("upper", upper)):
         if values is not None:
             options[name] = to_numbers(name, values, 1)

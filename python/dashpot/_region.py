@@ -10,8 +10,8 @@ from typing import Any
 import numpy.typing as npt
 
 from ._core import Error
-from ._results import Array, Result, to_gain, to_numbers, to_vector
-from ._robot import Robot, check_postures, is_tool
+from ._results import Array, Result, to_numbers
+from ._robot import Robot, check_postures, gains_text
 from ._workers import Task, chunks_of, collect, workers
 
 
@@ -75,10 +75,8 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     if not period and (delay or cutoff or difference_velocity or integral_time or ideal_gravity
                        or gain_margin != 2):
         raise Error("period: missing; the other numbers of a loop need it")
-    gains = (to_gain("joint_stiffness", joint_stiffness), None, 0.0,
-             to_gain("task_stiffness", task_stiffness), None, 0.0,
-             to_vector("null_stiffness", null_stiffness), to_vector("null_damping", null_damping),
-             0.0, is_tool(frame), [True] * 6)
+    gains = gains_text(joint_stiffness=joint_stiffness, task_stiffness=task_stiffness,
+                       null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": False,
                                "kinematic_null_space": False,
                                "period": float(period), "delay": int(delay),

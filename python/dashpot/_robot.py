@@ -30,31 +30,31 @@ def _options(*, gravity: npt.ArrayLike | None = None, include_off_chain: bool = 
              payload_mass: float = 0, payload_center: npt.ArrayLike = (0, 0, 0),
              payload_inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
              tool: npt.ArrayLike | None = None) -> dict[str, Any]:
-    """Returns the options of from_urdf as the core takes them."""
+    """Returns the options of from_urdf as a configuration has them in `robot`."""
     options: dict[str, Any] = {"include_off_chain": include_off_chain,
-                               "accept_inertias": accept_inertias is True,
-                               "accept_inertias_of": ([] if isinstance(accept_inertias, bool)
-                                                      else list(accept_inertias)),
-                               "payload_mass": float(payload_mass),
-                               "payload_center": _sized("payload_center", payload_center, (3,)),
-                               "payload_inertia": _sized("payload_inertia", payload_inertia,
-                                                         (3, 3))}
+                               "accept_inertias": (accept_inertias
+                                                   if isinstance(accept_inertias, bool)
+                                                   else list(accept_inertias)),
+                               "position_sensor": position_sensor}
     if drives or drives_friction:
         options["drives"], options["drives_friction"] = drives, drives_friction
     if gravity is not None:
         options["gravity"] = _sized("gravity", gravity, (3,))
-    if position_sensor != "motor":
-        options["position_sensor"] = position_sensor
     for name, values in (("reflected_inertia", reflected_inertia),
                          ("viscous_friction", viscous_friction),
                          ("coulomb_friction", coulomb_friction),
                          ("gear_stiffness", gear_stiffness), ("gear_damping", gear_damping)):
         if values is not None:
-            options[name] = to_numbers(name, values, 1)
+            rigid = name == "gear_stiffness"
+            options[name] = ["none" if rigid and value == np.inf else value
+                             for value in to_numbers(name, values, 1).tolist()]
+    if payload_mass:
+        options["payload"] = {"mass": float(payload_mass),
+                              "center": _sized("payload_center", payload_center, (3,)),
+                              "inertia": _sized("payload_inertia", payload_inertia, (3, 3))}
     if tool is not None:
-        pose = _sized("tool", tool, (4, 4))
-        options["tool_position"] = pose[:3, 3].copy()
-        options["tool_rotation"] = pose[:3, :3].copy()
+        pose = np.array(_sized("tool", tool, (4, 4)))
+        options["tool"] = {"position": pose[:3, 3].tolist(), "rpy": _mujoco.rpy_of(pose[:3, :3])}
     return options
 
 
@@ -117,7 +117,8 @@ class Robot:
                  **options: Any) -> None:
         """Reads the text of a URDF; `file` stands for it in messages. See from_urdf."""
         self._arguments = (urdf, base, tip, file, options)
-        self._core = _core.Robot(urdf, file, base, tip, options)
+        self._keys = {"urdf": file, "base": base, "tip": tip, **_options(**options)}
+        self._core = _core.Robot(urdf, json.dumps({"robot": self._keys}))
         self.joint_names = tuple(self._core.joint_names())
         for name, values in self._core.joint_properties().items():
             values.flags.writeable = False
@@ -159,14 +160,14 @@ class Robot:
         Raises Error that names file, joint or link and reason, and warns of what is doubtful, as a
         mass that is hardly one in kg.
         """
-        options = _options(gravity=gravity, include_off_chain=include_off_chain,
-                           accept_inertias=accept_inertias, drives=drives,
-                           drives_friction=drives_friction, reflected_inertia=reflected_inertia,
-                           viscous_friction=viscous_friction, coulomb_friction=coulomb_friction,
-                           gear_stiffness=gear_stiffness, gear_damping=gear_damping,
-                           position_sensor=position_sensor,
-                           payload_mass=payload_mass, payload_center=payload_center,
-                           payload_inertia=payload_inertia, tool=tool)
+        options: dict[str, Any] = {
+            "gravity": gravity, "include_off_chain": include_off_chain,
+            "accept_inertias": accept_inertias, "drives": drives,
+            "drives_friction": drives_friction, "reflected_inertia": reflected_inertia,
+            "viscous_friction": viscous_friction, "coulomb_friction": coulomb_friction,
+            "gear_stiffness": gear_stiffness, "gear_damping": gear_damping,
+            "position_sensor": position_sensor, "payload_mass": payload_mass,
+            "payload_center": payload_center, "payload_inertia": payload_inertia, "tool": tool}
         file = os.fspath(path)
         text = _core.read_urdf(file)
         try:
@@ -193,11 +194,10 @@ class Robot:
         """
         loaded, name = _mujoco.load(model)
         arm = _mujoco.read_arm(loaded, name, base, tip)
-        return cls(arm.urdf, arm.base, arm.tip, file=name, **_options(
-            accept_inertias=True,
-            gravity=arm.gravity if gravity is None else gravity,
-            reflected_inertia=(arm.reflected_inertia if reflected_inertia is None
-                               else reflected_inertia), **options))
+        return cls(arm.urdf, arm.base, arm.tip, file=name, accept_inertias=True,
+                   gravity=arm.gravity if gravity is None else gravity,
+                   reflected_inertia=(arm.reflected_inertia if reflected_inertia is None
+                                      else reflected_inertia), **options)
 
     def save(self, path: str | os.PathLike[str]) -> tuple[str, str]:
         """Writes the robot as files that the program and other programs read: its URDF to `path`,
@@ -205,21 +205,9 @@ class Robot:
         Returns both paths."""
         urdf = os.fspath(path)
         config = os.path.splitext(urdf)[0] + ".yaml"
-        text, base, tip, _, options = self._arguments
-        robot: dict[str, Any] = {"urdf": os.path.basename(urdf), "base": base, "tip": tip}
-        for key, value in options.items():
-            if not key.startswith(("payload", "tool", "accept_inertias_of")):
-                robot[key] = value.tolist() if isinstance(value, np.ndarray) else value
-        if options.get("accept_inertias_of"):
-            robot["accept_inertias"] = options["accept_inertias_of"]
-        if options.get("payload_mass"):
-            robot["payload"] = {key: np.asarray(options[f"payload_{key}"]).tolist()
-                                for key in ("mass", "center", "inertia")}
-        if "tool_position" in options:
-            robot["tool"] = {"position": options["tool_position"].tolist(),
-                             "rpy": list(_mujoco.rpy_of(options["tool_rotation"]))}
+        robot = {**self._keys, "urdf": os.path.basename(urdf)}
         with open(urdf, "w", encoding="utf-8") as file:
-            file.write(text)
+            file.write(self._arguments[0])
         with open(config, "w", encoding="utf-8") as file:
             json.dump({"robot": robot}, file, indent=2)
             file.write("\n")
@@ -229,7 +217,7 @@ class Robot:
         """Returns the robot without the viscous friction of its URDF, unless that is asked for or
         other friction is stated."""
         urdf, base, tip, file, options = self._arguments
-        stated = "viscous_friction" in options or options.get("drives_friction")
+        stated = options.get("viscous_friction") is not None or options.get("drives_friction")
         if urdf_friction or stated or not self.viscous_friction.any():
             return self
         return _make_robot(urdf, base, tip, file,
@@ -298,12 +286,13 @@ def _joint_values(name: str, values: npt.ArrayLike) -> Array:
     return to_numbers(name, values, 1)
 
 
-def _sized(name: str, given: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
+def _sized(name: str, given: npt.ArrayLike, shape: tuple[int, ...]) -> list[Any]:
     numbers = to_numbers(name, given, len(shape))
     if numbers.shape != shape:
         raise Error(f"{name}: is {' x '.join(map(str, numbers.shape))}, "
                     f"expected {' x '.join(map(str, shape))}")
-    return numbers
+    listed: list[Any] = numbers.tolist()
+    return listed
 
 
 def check_postures(robot: Robot, name: str, postures: Iterable[Array]) -> None:
@@ -329,6 +318,20 @@ def is_tool(frame: str) -> bool:
     if frame not in ("base", "tool"):
         raise Error(f"frame: '{frame}' is none of base, tool")
     return frame == "tool"
+
+
+def gains_text(**given: Any) -> str:
+    """Returns gains as a configuration has them: task_damping is gains.task.damping. What is None, or
+    a ratio of 0, is missing."""
+    gains: dict[str, dict[str, Any]] = {"joint": {}, "task": {}, "null_space": {}}
+    for key, value in given.items():
+        part, _, name = key.partition("_")
+        if value is None or (name == "damping_ratio" and value == 0):
+            continue
+        if name in ("stiffness", "damping"):
+            value = np.asarray((to_vector if part == "null" else to_gain)(key, value)).tolist()
+        gains["null_space" if part == "null" else part][name] = value
+    return json.dumps({"gains": gains}, default=float)
 
 
 def is_cartesian(mode: str) -> bool:
@@ -381,13 +384,12 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     at_tip = joint_stiffness is None and joint_damping is None and joint_damping_ratio == 0
     if not at_tip and not (task_stiffness is None and task_damping is None):
         raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
-    gains = _core.Gains(robot._core, to_gain("joint_stiffness", joint_stiffness),
-                        to_gain("joint_damping", joint_damping), joint_damping_ratio,
-                        to_gain("task_stiffness", task_stiffness),
-                        to_gain("task_damping", task_damping), task_damping_ratio,
-                        to_vector("null_stiffness", null_stiffness),
-                        to_vector("null_damping", null_damping), null_damping_ratio,
-                        is_tool(frame), selected(directions))
+    gains = _core.Gains(robot._core, gains_text(
+        joint_stiffness=joint_stiffness, joint_damping=joint_damping,
+        joint_damping_ratio=joint_damping_ratio, task_stiffness=task_stiffness,
+        task_damping=task_damping, task_damping_ratio=task_damping_ratio, task_frame=frame,
+        task_directions=list(directions), null_stiffness=null_stiffness,
+        null_damping=null_damping, null_damping_ratio=null_damping_ratio))
     found = _core.closed_loop(robot._core, _joint_values("q", q), gains, at_tip,
                               to_vector("external_wrench", external_wrench), kind, soft_frequency)
     return ClosedLoop(found["mass"], found["damping"], found["stiffness"],

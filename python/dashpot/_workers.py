@@ -22,10 +22,10 @@ class Task:
     Each chunk brings the task along as the same bytes, and a process makes its robot only once.
     """
 
-    def __init__(self, robot: Robot, gains: tuple[Any, ...], at_tip: bool,
+    def __init__(self, robot: Robot, gains: str, at_tip: bool,
                  options: dict[str, Any]) -> None:
         self._arguments = (robot, gains, at_tip, options)
-        self.core = _core.Audit(robot._core, _core.Gains(robot._core, *gains), at_tip, options)
+        self.core = _core.Audit(robot._core, _core.Gains(robot._core, gains), at_tip, options)
 
     @functools.cached_property
     def _bytes(self) -> bytes:

@@ -10,6 +10,7 @@
 #include <nanobind/stl/pair.h>
 
 #include <functional>
+#include <type_traits>
 
 namespace dashpot::python {
 namespace {
@@ -35,21 +36,20 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   AuditOptions options;
   options.mode = cartesian ? controller::Mode::kCartesian : controller::Mode::kJoint;
   options.gains = gains;
-  options.half_quaternion = nb::cast<bool>(given["half_quaternion"]);
-  options.inertia_blocks = nb::cast<bool>(given["inertia_blocks"]);
-  options.kinematic_null_space = nb::cast<bool>(given["kinematic_null_space"]);
-  options.period = nb::cast<double>(given["period"]);
-  options.delay = nb::cast<int>(given["delay"]);
-  options.cutoff = nb::cast<double>(given["cutoff"]);
-  options.difference_velocity = nb::cast<bool>(given["difference_velocity"]);
-  options.soft_frequency = nb::cast<double>(given["soft_frequency"]);
-  if (given.contains("integral_time")) {
-    options.integral_time = nb::cast<double>(given["integral_time"]);
-  }
-  if (given.contains("ideal_gravity")) {
-    options.ideal_gravity = nb::cast<bool>(given["ideal_gravity"]);
-  }
-  if (given.contains("margin")) options.margin = nb::cast<double>(given["margin"]);
+  const auto take = [&](const char* key, auto& value) {
+    if (given.contains(key)) value = nb::cast<std::remove_reference_t<decltype(value)>>(given[key]);
+  };
+  take("half_quaternion", options.half_quaternion);
+  take("inertia_blocks", options.inertia_blocks);
+  take("kinematic_null_space", options.kinematic_null_space);
+  take("period", options.period);
+  take("delay", options.delay);
+  take("cutoff", options.cutoff);
+  take("difference_velocity", options.difference_velocity);
+  take("soft_frequency", options.soft_frequency);
+  take("integral_time", options.integral_time);
+  take("ideal_gravity", options.ideal_gravity);
+  take("margin", options.margin);
   if (given.contains("lower")) {
     options.lower = robot.joint_vector("lower", nb::cast<Eigen::VectorXd>(given["lower"]));
   }

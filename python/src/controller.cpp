@@ -56,15 +56,8 @@ void check(std::int32_t code) {
   if (code < DASHPOT_OK) throw std::invalid_argument(dashpot_last_error());
 }
 
-/// Without lines: the text was made from a dict.
-void forget_lines(controller::YamlNode& node) {
-  node.line = 0;
-  for (controller::YamlNode& item : node.items) forget_lines(item);
-}
-
 std::unique_ptr<Host> from_text(const std::string& text, const std::string& directory) {
-  controller::YamlNode document = controller::parse_yaml(text);
-  forget_lines(document);
+  const controller::YamlNode document = controller::parse_made_yaml(text);
   return std::make_unique<Host>(create_controller(controller::read_config(document, directory)));
 }
 

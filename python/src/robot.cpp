@@ -1,5 +1,7 @@
 // The robot's dynamics, and its closed loop with springs and dampers.
 
+#include <dashpot/controller/config/config_gains.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -11,7 +13,9 @@
 #include <dashpot/python/src/analysis.hpp>
 #include <dashpot/python/src/robot.hpp>
 
+#include <array>
 #include <cmath>
+#include <string_view>
 
 namespace dashpot::python {
 
@@ -92,84 +96,18 @@ nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& 
   return result;
 }
 
-Robot make_robot(const std::string& urdf, const std::string& name, const std::string& base,
-                 const std::string& tip, const nb::dict& given) {
-  controller::ModelOptions options;
-  const auto read = [&](const char* key, auto& value) {
-    using Value = std::remove_reference_t<decltype(value)>;
-    if (given.contains(key)) value = nb::cast<Value>(given[key]);
-  };
-  const auto read_vector = [&](const char* key, JointVector& value) {
-    if (!given.contains(key)) return;
-    const auto numbers = nb::cast<Eigen::VectorXd>(given[key]);
-    if (numbers.size() > controller::kMaxJoints) {
-      throw std::invalid_argument(std::string(key) + ": has more than 16 entries");
-    }
-    value = numbers;
-  };
-  read("gravity", options.gravity);
-  read("include_off_chain", options.include_off_chain);
-  read("accept_inertias", options.accept_inertias);
-  read("accept_inertias_of", options.accept_inertias_of);
-  read_vector("reflected_inertia", options.reflected_inertia);
-  read_vector("viscous_friction", options.viscous_friction);
-  read_vector("coulomb_friction", options.coulomb_friction);
-  read_vector("gear_stiffness", options.gear_stiffness);
-  read_vector("gear_damping", options.gear_damping);
-  if (given.contains("position_sensor")) {
-    const auto sensor = nb::cast<std::string>(given["position_sensor"]);
-    if (sensor != "motor" && sensor != "link") {
-      throw std::invalid_argument("position_sensor: '" + sensor + "' is none of motor, link");
-    }
-    if (sensor == "link") options.position_sensor = controller::PositionSensor::kLink;
-  }
-  if (given.contains("drives")) options.drives = nb::cast<std::string>(given["drives"]);
-  if (!options.drives.empty()) try {
-      controller::find_drives(options.drives);
-    } catch (const controller::InvalidModel& error) {
-      throw std::invalid_argument(std::string("drives: ") + error.what());
-    }
-  read("drives_friction", options.drives_friction);
-  read("payload_mass", options.payload.mass);
-  read("payload_center", options.payload.center);
-  read("payload_inertia", options.payload.inertia);
-  read("tool_position", options.tool.position);
-  read("tool_rotation", options.tool.rotation);
-  return Robot(RobotModel::from_urdf_text(urdf, base, tip, options, name));
+/// The robot of a URDF's text that stands under the key `robot` of another, as in a configuration.
+Robot make_robot(const std::string& urdf, const std::string& text) {
+  static constexpr std::array<std::string_view, 1> kKeys = {"robot"};
+  const controller::YamlNode document = controller::parse_made_yaml(text);
+  return Robot(controller::read_robot({document, "", kKeys}, "", urdf).model());
 }
 
-Gains make_gains(const Robot& robot, const OptionalMatrix& joint_stiffness,
-                 const OptionalMatrix& joint_damping, double joint_damping_ratio,
-                 const OptionalMatrix& task_stiffness, const OptionalMatrix& task_damping,
-                 double task_damping_ratio, const OptionalVector& null_stiffness,
-                 const OptionalVector& null_damping, double null_damping_ratio, bool tool_frame,
-                 const std::vector<bool>& directions) {
-  const Eigen::Index n = robot.model.dof();
-  const auto check = [](const char* key, const auto& given, Eigen::Index rows, Eigen::Index cols) {
-    if (given) analysis::check_size(key, *given, rows, cols);
-  };
-  check("joint_stiffness", joint_stiffness, n, n);
-  check("joint_damping", joint_damping, n, n);
-  check("task_stiffness", task_stiffness, 6, 6);
-  check("task_damping", task_damping, 6, 6);
-  check("null_stiffness", null_stiffness, n, 1);
-  check("null_damping", null_damping, n, 1);
-  if (directions.size() != 6) throw std::invalid_argument("directions: six are wanted");
-  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(n, n);
-  const Eigen::VectorXd none_each = Eigen::VectorXd::Zero(n);
-  Gains gains;
-  gains.joint_stiffness = joint_stiffness.value_or(none);
-  gains.joint_damping = joint_damping.value_or(none);
-  gains.joint_damping_ratio = joint_damping_ratio;
-  if (task_stiffness) gains.task_stiffness = *task_stiffness;
-  if (task_damping) gains.task_damping = *task_damping;
-  gains.task_damping_ratio = task_damping_ratio;
-  gains.null_stiffness = null_stiffness.value_or(none_each);
-  gains.null_damping = null_damping.value_or(none_each);
-  gains.null_damping_ratio = null_damping_ratio;
-  gains.frame = tool_frame ? controller::Frame::kTool : controller::Frame::kBase;
-  std::copy(directions.begin(), directions.end(), gains.directions.begin());
-  return gains;
+/// The gains that stand under the key `gains` of a text, as in a configuration.
+Gains make_gains(const Robot& robot, const std::string& text) {
+  static constexpr std::array<std::string_view, 1> kKeys = {"gains"};
+  const controller::YamlNode document = controller::parse_made_yaml(text);
+  return controller::read_gains({document, "", kKeys}, robot.model);
 }
 
 nb::dict published_drives() {
@@ -211,10 +149,11 @@ nb::dict joint_properties(const Robot& robot) {
 void add_robot(nb::module_& m) {
   using Vector = Eigen::VectorXd;
   m.def("published_drives", &published_drives);
-  m.def("read_urdf", &controller::read_text, nb::arg("path"));
+  m.def(
+      "read_urdf", [](const std::string& path) { return controller::read_text(path); },
+      nb::arg("path"));
   nb::class_<Robot>(m, "Robot", "controller::RobotModel with its DynamicsKernel")
-      .def(nb::new_(&make_robot), nb::arg("urdf"), nb::arg("name"), nb::arg("base"), nb::arg("tip"),
-           nb::arg("options"))
+      .def(nb::new_(&make_robot), nb::arg("urdf"), nb::arg("text"))
       .def_prop_ro("name", [](const Robot& robot) { return robot.model.name(); })
       .def("joint_names",
            [](const Robot& robot) {
@@ -243,12 +182,7 @@ void add_robot(nb::module_& m) {
         return to_array(dynamics(robot, q, qd).Jdot_qd);
       });
   nb::class_<Gains>(m, "Gains", "controller::Gains")
-      .def(nb::new_(&make_gains), nb::arg("robot"), nb::arg("joint_stiffness").none(),
-           nb::arg("joint_damping").none(), nb::arg("joint_damping_ratio"),
-           nb::arg("task_stiffness").none(), nb::arg("task_damping").none(),
-           nb::arg("task_damping_ratio"), nb::arg("null_stiffness").none(),
-           nb::arg("null_damping").none(), nb::arg("null_damping_ratio"), nb::arg("tool_frame"),
-           nb::arg("directions"));
+      .def(nb::new_(&make_gains), nb::arg("robot"), nb::arg("text"));
   m.def("closed_loop", &closed_loop, nb::arg("robot"), nb::arg("q"), nb::arg("gains"),
         nb::arg("cartesian"), nb::arg("external_wrench").none(), nb::arg("load"),
         nb::arg("soft_frequency"));

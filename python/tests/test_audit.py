@@ -41,7 +41,7 @@ def test_an_integral_counts_in_the_margin(panda):
     np.testing.assert_allclose(found.integral_decays, 0.5, atol=0.1)
     assert found.gain_margin == pytest.approx(plain.gain_margin, rel=0.02)
     quick = dashpot.audit(panda, HOME, **stiff, period=0.001, integral_time=0.8).posture
-    assert plain.gain_margin > 1 and quick.gain_margin == 0
+    assert plain.gain_margin > 1 and quick.gain_margin < 0.01
     assert found.smallest_ratio == plain.smallest_ratio
     with pytest.raises(dashpot.Error, match="integral_time"):
         dashpot.audit(panda, HOME, **stiff, period=0.001, integral_time=-1)
@@ -131,7 +131,7 @@ def test_postures_outside_the_limits_are_refused_unless_asked_for(panda):
 
 
 @pytest.mark.parametrize("given, message", [
-    (dict(task_stiffness=np.eye(5)), "task_stiffness: is 5 x 5, expected 6 x 6"),
+    (dict(task_stiffness=np.eye(5)), "gains.task.stiffness: is 5 x 5; 6 x 6"),
     (dict(task_stiffness=[-1, 0, 0, 0, 0, 0]), "task_stiffness: is not positive semidefinite"),
     (dict(damping_factor=2.0), "damping_factor"),
     (dict(task_stiffness=[1] * 6, joint_stiffness=[1] * 7), "not both"),

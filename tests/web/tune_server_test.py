@@ -339,7 +339,7 @@ class TuneServer(unittest.TestCase):
         for words in ('', '{', '[]', 'null', '7', '"a"', '{"design": 3}', '[' * 60000, '{"a":' * 9000, b'\xff\xfe'):
             self.assertEqual(post('/design', words)[0], 400, words[:20])
         for change in ({'q': self.q[:-1]}, {'q': ['a'] * 7}, {'q': [1e300] * 7}, {'q': None}, {'place': 'tip/6'}, {'place': 'joint/7'},
-                       {'place': 'tip/-1'}, {'place': 3}, {'design': {}} | {'q': 0}, {'design': self.base | {'evil': 1}},
+                       {'place': 'tip/-1'}, {'place': 3}, {'q': '0 kg'}, {'design': self.base | {'evil': 1}},
                        {'design': self.base | {'stiffness': [1] * 5}}, {'design': self.base | {'stiffness': [[1] * 6] * 5}},
                        {'design': self.base | {'damping': {'ratio': 3}}}, {'design': self.base | {'damping': {'factor': 2, 'x': 1}}},
                        {'design': self.base | {'delay': 21}}, {'design': self.base | {'delay': 1.5}}, {'design': self.base | {'period': -1}}, {'design': self.base | {'mode': 'x'}},
