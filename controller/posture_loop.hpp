@@ -5,6 +5,7 @@
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/tick_status.hpp>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -32,10 +33,19 @@ LoopTiming timing_of(const Settings& settings);
 /// Returns the loop with this timing, without its gravity where that is ideal.
 analysis::SampledLoop timed(const LoopTiming& timing, analysis::SampledLoop loop);
 
-/// Returns what a closed loop leaves out that an arm may have, in the short names that
-/// docs/concepts.md explains: "gravity ideal", "rotors unknown". In all commands the same.
-/// `model` is null where only matrices are known.
-std::vector<std::string> loop_assumptions(const LoopTiming& timing, const RobotModel* model);
+/// Returns what a closed loop leaves out that an arm may have, as a sum of powers of two, one for
+/// each of assumption_names. In all commands the same. `model` is null where only matrices are
+/// known.
+std::uint32_t assumption_bits(const LoopTiming& timing, const RobotModel* model);
+
+/// Returns the short names that docs/concepts.md explains: "gravity ideal", "rotors unknown".
+std::vector<std::string> assumption_names(std::uint32_t bits);
+
+/// Returns the names of what a loop leaves out.
+inline std::vector<std::string> loop_assumptions(const LoopTiming& timing,
+                                                 const RobotModel* model) {
+  return assumption_names(assumption_bits(timing, model));
+}
 
 /// Motions slower than this, rad/s, do not count in a gain margin, because a self-motion fed by the
 /// compensation of gravity through a zero-order hold is no vibration.
@@ -63,6 +73,7 @@ class SampledArm {
   const LoopTiming& timing() const noexcept { return timing_; }
   const analysis::Gears& gears() const noexcept { return gears_; }
   const JointVector& friction() const noexcept { return friction_; }  ///< viscous, n, N m s/rad
+  std::uint32_t assumes() const noexcept { return assumes_; }         ///< see assumption_bits
 
   /// Returns the loop at the posture `q` (n, rad), in joint coordinates, with what the world adds,
   /// and with the integral of the springs, see integral_stiffness.
@@ -74,7 +85,12 @@ class SampledArm {
   LoopTiming timing_;
   analysis::Gears gears_;
   JointVector friction_;
+  std::uint32_t assumes_;
 };
+
+/// Returns what designs the damping of springs for their ratios: as much of it as the sampled loop
+/// of the settings, without gravity and gears, bears with Limits::gain_margin and a reserve.
+DesignedDamping designed_damping(const RobotModel& model, const Settings& settings);
 
 /// Returns a system whose size is not bounded by the type.
 analysis::System<> unbounded(const analysis::System<kMaxJoints>& system);

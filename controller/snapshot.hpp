@@ -118,6 +118,7 @@ struct SampledVibration {
   /// All gains can grow by this factor before the loop is unstable; NaN if it could not be
   /// analysed.
   double gain_margin = std::numeric_limits<double>::quiet_NaN();
+  std::uint32_t assumes = 0;                           ///< see assumption_bits
   int count = 0;                                       ///< of modes
   std::array<SampledVibrationMode, kMaxJoints> modes;  ///< by falling continuous frequency
   /// Eigenvalues that the integral of the springs makes, 1/s, SampledSpectrum::memory

@@ -2,6 +2,7 @@
 #include <dashpot/apps/loop/command_report.hpp>
 #include <dashpot/apps/monitor/monitor_view.hpp>
 #include <dashpot/apps/report/modes.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/tick_status.hpp>
 
 #include <algorithm>
@@ -60,7 +61,7 @@ std::string verdict(const sampled_modes_t& modes) {
   }
   const std::string margin = format_number(modes.gain_margin, 3);
   if (std::isnan(modes.spectral_radius)) return "unknown";
-  if (!(modes.spectral_radius < 1)) {
+  if (modes.gain_margin < 1) {
     return "UNSTABLE; all gains have to shrink to " + margin + " of what they are";
   }
   if (std::isinf(modes.gain_margin)) return "stable, however large the gains";
@@ -235,7 +236,9 @@ std::string MonitorView::modes_table() const {
 
 std::string MonitorView::sampled_table() const {
   const sampled_modes_t& modes = *sampled_;
-  std::string out = "  tick " + std::to_string(modes.tick) + ": " + verdict(modes) + "\n\n";
+  std::string out =
+      "  tick " + std::to_string(modes.tick) + ": " + verdict(modes) + "\n" +
+      assumes_text(controller::assumption_names(static_cast<std::uint32_t>(modes.assumes))) + "\n";
   TextTable table({{Align::kPoint, {"continuous", "rad/s"}},
                    {Align::kPoint, {"", "ratio"}},
                    {Align::kPoint, {"sampled", "rad/s"}},

@@ -1,6 +1,7 @@
 #include <dashpot/analysis/mode.hpp>
 #include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/apps/report/message_json.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/tick_status.hpp>
 #include <dashpot/lcmtypes/messages/message_fields.hpp>
 
@@ -23,6 +24,13 @@ const char* status_text(const auto& /*modes*/, std::int8_t status) {
 
 const char* kind_text(std::int8_t kind) {
   return analysis::to_text(static_cast<analysis::ModeKind>(kind));
+}
+
+std::vector<std::string> assumed(std::int32_t bits) {
+  return controller::assumption_names(static_cast<std::uint32_t>(bits));
+}
+std::vector<std::string> assumed(const auto& /*no such field*/) {
+  return {};
 }
 
 MessageJson schema_of(const MessageJson& value) {
@@ -57,6 +65,7 @@ MessageJson message_json(const Message& message) {
       json[name + "_text"] = MessageJson::array();
       for (const std::int8_t kind : value) json[name + "_text"].push_back(kind_text(kind));
     }
+    if (name == "assumes") json[name + "_text"] = assumed(value);
   });
   return json;
 }

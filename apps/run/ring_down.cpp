@@ -106,23 +106,24 @@ std::vector<Row> rows_of(const dashpot_modes& predicted) {
   return rows;
 }
 
-/// The loop of a scene at its rest as its drives hold, delay and filter the torque; friction and
-/// gravity are those that the controller believes in.
-controller::LoopAt loop_at_rest(const Scene& scene) {
+/// The loop of a scene as its drives hold, delay and filter the torque; friction and gravity are
+/// those that the controller believes in.
+controller::PostureLoop sampled_as(const Scene& scene) {
   controller::Settings settings = scene.arm->config.settings;
   settings.period = scene.plant.period;
   settings.analysis.sampled.delay = scene.plant.delay;
   settings.analysis.sampled.cutoff = scene.plant.torque_cutoff;
   settings.analysis.sampled.difference_velocity = scene.plant.difference_velocity;
-  const controller::Setpoint& setpoint = scene.steps.front().setpoint;
-  return controller::PostureLoop(scene.arm->config.model, settings)
-      .at(scene.rest, setpoint.gains, setpoint.mode);
+  return {scene.arm->config.model, settings};
 }
 
 /// Adds what the modes become in the sampled loop, and where they are there. A mode that moves
 /// further than kFarthest has no counterpart there that could be told from others.
 void add_sampled(const Scene& scene, RingDown& ring_down, std::vector<Row>& rows) {
-  const auto [system, loop] = loop_at_rest(scene);
+  controller::PostureLoop at_rest = sampled_as(scene);
+  const controller::Setpoint& setpoint = scene.steps.front().setpoint;
+  const auto [system, loop] = at_rest.at(scene.rest, setpoint.gains, setpoint.mode);
+  ring_down.assumes = controller::assumption_names(at_rest.arm().assumes());
   const analysis::Spectrum<> continuous = analysis::analyze(system);
   const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
   ring_down.gain_margin = analysis::gain_margin(system, continuous, loop);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace dashpot::apps {
@@ -29,6 +30,7 @@ struct RingDown {
   double growth = 0;       ///< of the fastest growing motion of the sampled loop, 1/s
   double gain_margin = 0;  ///< factor by which all gains may grow before the sampled loop becomes
                            ///< unstable; 0 for a system of matrices
+  std::vector<std::string> assumes;     ///< what that loop leaves out
   std::vector<double> integral_decays;  ///< of the slow modes that the integral makes, 1/s, the
                                         ///< slowest first; negative where they grow
 };

@@ -70,13 +70,18 @@ std::vector<Field<RingDownMode>> ring_down_fields() {
 }
 
 std::string stability_text(const RingDown& ring_down) {
+  const bool stable = ring_down.gain_margin >= 1;
+  std::string text;
   if (ring_down.growth > 0) {
-    return "  In this loop a motion grows e-fold every " + format_number(1 / ring_down.growth, 3) +
-           " s: the torque comes too late.\n";
+    text = std::string("  ") + (stable ? "A slow motion" : "In this loop a motion") +
+           " grows e-fold every " + format_number(1 / ring_down.growth, 3) + " s: the torque " +
+           (stable ? "against gravity comes late.\n" : "comes too late.\n");
   }
-  if (!(ring_down.gain_margin > 0)) return "";  // nothing is sampled
-  return "  All gains together may grow by a factor of " + format_number(ring_down.gain_margin, 3) +
-         " before this loop becomes unstable.\n";
+  if (stable) {
+    text += "  All gains together may grow by a factor of " +
+            format_number(ring_down.gain_margin, 3) + " before this loop becomes unstable.\n";
+  }
+  return text.empty() ? "" : text + assumes_text(ring_down.assumes);
 }
 
 std::string pace_text(const RunReport& report) {
@@ -232,6 +237,7 @@ Json ring_down_json(const RingDown& ring_down) {
           {"residual", ring_down.residual},
           {"growth", ring_down.growth},
           {"gain_margin", ring_down.gain_margin},
+          {"assumes", ring_down.assumes},
           {"integral_decays", ring_down.integral_decays},
           {"modes", json_of(ring_down.modes, ring_down_fields())}};
 }

@@ -62,7 +62,6 @@ ArmView::ArmView(const std::string& config) : config_(controller::load_config(co
 
 ArmJson ArmView::chain() const {
   ArmJson document = chain_json(config_.model);
-  document["assumes"] = loop_assumptions(controller::timing_of(config_.settings), &config_.model);
   document["walls"] = ArmJson::array();
   const auto add_wall = [&walls = document["walls"]](
                             const std::string& name, const Eigen::Vector3d& p,

@@ -27,8 +27,7 @@ class ArmView {
   /// The gain margin that gains have to leave, no unit.
   double gain_margin() const { return config_.settings.limits.gain_margin; }
 
-  /// Returns the chain with "assumes", see controller::loop_assumptions, and
-  /// {"walls": [{"name", "point", "normal", "stiffness"}]} besides. A wall's
+  /// Returns the chain with {"walls": [{"name", "point", "normal", "stiffness"}]} besides. A wall's
   /// normal points to where the tip may be; a simulated wall has a stiffness, N/m, others null.
   nlohmann::ordered_json chain() const;
 

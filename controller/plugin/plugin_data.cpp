@@ -266,6 +266,7 @@ void to_c(const SampledVibration& vibration, dashpot_sampled_modes& out) noexcep
   put(vibration.position, out.position);
   out.spectral_radius = vibration.spectral_radius;
   out.gain_margin = vibration.gain_margin;
+  out.assumes = vibration.assumes;
   out.status = static_cast<std::int32_t>(vibration.status);
   out.count = static_cast<std::uint32_t>(vibration.count);
   for (std::uint32_t i = 0; i < out.count; ++i) {

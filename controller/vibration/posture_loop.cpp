@@ -1,14 +1,21 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/rotors.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
+#include <dashpot/controller/vibration/closed_loop.hpp>
 
 #include <Eigen/Eigenvalues>
+#include <array>
 #include <exception>
 #include <stdexcept>
 #include <utility>
 
 namespace dashpot::controller {
+namespace {
+
+constexpr std::array<const char*, 6> kAssumptions = {
+    "continuous", "gravity ideal", "delay none", "rotors unknown", "gears rigid", "friction none"};
+
+}  // namespace
 
 LoopTiming timing_of(const Settings& settings) {
   const Analysis::Sampled& sampled = settings.analysis.sampled;
@@ -23,22 +30,28 @@ analysis::SampledLoop timed(const LoopTiming& timing, analysis::SampledLoop loop
   loop.torque_cutoff = timing.cutoff;
   loop.difference_velocity = timing.difference_velocity;
   if (timing.ideal_gravity) loop.gravity_gradient.resize(0, 0);
-  loop.slowest = kSlowestVibration;
   return loop;
 }
 
-std::vector<std::string> loop_assumptions(const LoopTiming& timing, const RobotModel* model) {
+std::uint32_t assumption_bits(const LoopTiming& timing, const RobotModel* model) {
+  const bool sampled = timing.period > 0;
+  const std::array<bool, kAssumptions.size()> left_out = {
+      !sampled,
+      sampled && timing.ideal_gravity,
+      sampled && timing.delay == 0,
+      model != nullptr && unknown_rotors(*model).any(),
+      model != nullptr && model->elastic_joints() == 0,
+      model != nullptr && model->joint_values(&Joint::viscous_friction).isZero(0)};
+  std::uint32_t bits = 0;
+  for (std::size_t i = 0; i < left_out.size(); ++i) bits |= std::uint32_t{left_out[i]} << i;
+  return bits;
+}
+
+std::vector<std::string> assumption_names(std::uint32_t bits) {
   std::vector<std::string> names;
-  if (timing.period == 0) {
-    names.emplace_back("continuous");
-  } else {
-    if (timing.ideal_gravity) names.emplace_back("gravity ideal");
-    if (timing.delay == 0) names.emplace_back("delay none");
+  for (std::size_t i = 0; i < kAssumptions.size(); ++i) {
+    if ((bits >> i & 1U) != 0) names.emplace_back(kAssumptions[i]);
   }
-  if (model == nullptr) return names;
-  if (unknown_rotors(*model).any()) names.emplace_back("rotors unknown");
-  if (model->elastic_joints() == 0) names.emplace_back("gears rigid");
-  if (model->joint_values(&Joint::viscous_friction).isZero(0)) names.emplace_back("friction none");
   return names;
 }
 
@@ -72,7 +85,8 @@ SampledArm::SampledArm(const RobotModel& model, const LoopTiming& timing)
     : kernel_(model),
       timing_(timing),
       gears_(elastic_joints(model)),
-      friction_(model.joint_values(&Joint::viscous_friction)) {}
+      friction_(model.joint_values(&Joint::viscous_friction)),
+      assumes_(assumption_bits(timing, &model)) {}
 
 analysis::SampledLoop SampledArm::at(const JointVector& q, const PassivePart* outside,
                                      const JointMatrix& K_I) const {
@@ -88,7 +102,19 @@ analysis::SampledLoop SampledArm::at(const JointVector& q, const PassivePart* ou
   if (!timing_.ideal_gravity) loop.gravity_gradient = gravity_gradient(kernel_, q);
   loop.memory = integral_memory(K_I, timing_.period);
   loop.gears = gears_;
+  loop.slowest = kSlowestVibration;
   return timed(timing_, std::move(loop));
+}
+
+DesignedDamping designed_damping(const RobotModel& model, const Settings& settings) {
+  constexpr double kReserve = 1.02;  // of the margin, for what couples modes
+  JointVector subtracted = JointVector::Zero(model.dof());
+  if (settings.subtract_friction) subtracted = friction_left(model, settings).cwiseMax(0);
+  const double margin = settings.limits.gain_margin;
+  if (margin == 1) return DesignedDamping(subtracted);
+  analysis::SampledLoop loop;
+  loop.friction = Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).asDiagonal();
+  return DesignedDamping(subtracted, {timed(timing_of(settings), loop), kReserve * margin});
 }
 
 analysis::System<> unbounded(const analysis::System<kMaxJoints>& system) {

@@ -16,17 +16,6 @@ constexpr std::chrono::milliseconds kLook{5};  // how often the thread looks for
 
 }  // namespace
 
-DesignedDamping designed_damping(const RobotModel& model, const Settings& settings) {
-  constexpr double kReserve = 1.02;  // of the margin, for what couples modes
-  JointVector subtracted = JointVector::Zero(model.dof());
-  if (settings.subtract_friction) subtracted = friction_left(model, settings).cwiseMax(0);
-  const double margin = settings.limits.gain_margin;
-  if (margin == 1) return DesignedDamping(subtracted);
-  analysis::SampledLoop loop;
-  loop.friction = Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).asDiagonal();
-  return DesignedDamping(subtracted, {timed(timing_of(settings), loop), kReserve * margin});
-}
-
 std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period) {
   std::vector<double> decays;
   for (const analysis::Complex z : sampled.memory) {
@@ -97,6 +86,7 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   result.tick = task.tick;
   result.resets = task.resets;
   result.position = task.position;
+  result.assumes = arm_.assumes();
   const analysis::System<> system = unbounded(task.system);
   const analysis::Spectrum<> continuous = analysis::analyze(system);
   result.status = continuous.status;

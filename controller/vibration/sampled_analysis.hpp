@@ -10,10 +10,6 @@
 
 namespace dashpot::controller {
 
-/// Returns what designs the damping of springs for their ratios: as much of it as the sampled loop
-/// of the settings, without gravity and gears, bears with Limits::gain_margin and a reserve.
-DesignedDamping designed_damping(const RobotModel& model, const Settings& settings);
-
 /// Returns at which rates, 1/s, the slow modes decay that the integral makes, the slowest first;
 /// negative: it grows.
 std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period);

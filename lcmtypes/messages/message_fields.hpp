@@ -87,6 +87,7 @@ void visit_fields(const Visit& visit) {
     visit("joint_position", &M::joint_position);
     visit("spectral_radius", &M::spectral_radius);
     visit("gain_margin", &M::gain_margin);
+    visit("assumes", &M::assumes);
     visit("continuous_frequency", &M::continuous_frequency);
     visit("continuous_ratio", &M::continuous_ratio);
     visit("natural_frequency", &M::natural_frequency);

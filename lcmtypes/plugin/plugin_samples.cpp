@@ -78,6 +78,7 @@ void fill(const dashpot_sampled_modes& from, SampledModesSample& to) noexcept {
   vibration.status = static_cast<analysis::Status>(from.status);
   vibration.spectral_radius = from.spectral_radius;
   vibration.gain_margin = from.gain_margin;
+  vibration.assumes = from.assumes;
   vibration.count = static_cast<int>(from.count);
   for (std::uint32_t i = 0; i < from.count; ++i) {
     const dashpot_sampled_mode& mode = from.modes[i];

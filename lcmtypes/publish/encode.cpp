@@ -184,6 +184,7 @@ void fill(const SampledModesSample& sample, sampled_modes_t& message) {
   copy_to(vibration.position, n, message.joint_position);
   message.spectral_radius = vibration.spectral_radius;
   message.gain_margin = vibration.gain_margin;
+  message.assumes = static_cast<std::int32_t>(vibration.assumes);
   for (auto* list :
        {&message.continuous_frequency, &message.continuous_ratio, &message.natural_frequency,
         &message.damping_ratio, &message.damped_frequency}) {

@@ -194,6 +194,8 @@ class TrackedSampledModes(Result):
     continuous_ratio: Array
     spectral_radius: float
     gain_margin: float
+    assumes: list[str]
+    """What the loop leaves out that the arm may have, such as "gravity ideal", "rotors unknown"."""
     time: int
     tick: int
     position: Array

@@ -1,6 +1,7 @@
 // What a controller found, as dicts.
 
 #include <dashpot/analysis/solver_status.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/python/src/controller_results.hpp>
 
 #include <array>
@@ -147,6 +148,7 @@ nb::object sampled_modes_of(dashpot_controller* controller) {
   result["status"] = to_text(static_cast<analysis::Status>(found.status));
   result["spectral_radius"] = found.spectral_radius;
   result["gain_margin"] = found.gain_margin;
+  result["assumes"] = controller::assumption_names(found.assumes);
   result["continuous_frequency"] =
       to_column(modes, [](const dashpot_sampled_mode& m) { return m.continuous_frequency; });
   result["continuous_ratio"] =

@@ -30,7 +30,7 @@ Eigen::Matrix3d rotation_of(const double (&q)[4]) {
 TEST(Messages, KeepTheirFingerprints) {
   EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0x2735b759af8e3e26u);
   EXPECT_EQ(static_cast<std::uint64_t>(modes_t::getHash()), 0x962c40e533830108u);
-  EXPECT_EQ(static_cast<std::uint64_t>(sampled_modes_t::getHash()), 0xd03418d8965d7894u);
+  EXPECT_EQ(static_cast<std::uint64_t>(sampled_modes_t::getHash()), 0xd605b071de0c1d61u);
   EXPECT_EQ(static_cast<std::uint64_t>(contact_t::getHash()), 0xb3c0e8daa3efb052u);
   EXPECT_EQ(static_cast<std::uint64_t>(command_t::getHash()), 0xff62ad054d3fc8dau);
 }
@@ -140,6 +140,7 @@ TEST(SampledModesMessage, SaysWhatTheSampleSays) {
     EXPECT_THAT(message.joint_position, ElementsAreArray(list(vibration.position)));
     EXPECT_EQ(message.spectral_radius, vibration.spectral_radius);
     EXPECT_EQ(message.gain_margin, vibration.gain_margin);
+    EXPECT_EQ(static_cast<std::uint32_t>(message.assumes), vibration.assumes);
     for (std::size_t i = 0; i < static_cast<std::size_t>(vibration.count); ++i) {
       const controller::SampledVibrationMode& mode = vibration.modes[i];
       EXPECT_EQ(message.continuous_frequency[i], mode.continuous_frequency);

@@ -104,6 +104,7 @@ inline SampledModesSample random_sampled_modes(Random& random, int n) {
   vibration.status = static_cast<analysis::Status>(random.integer(0, 9));
   vibration.spectral_radius = random.uniform(0.9, 1.1);
   vibration.gain_margin = random.uniform(0.1, 9);
+  vibration.assumes = static_cast<std::uint32_t>(random.integer(0, 63));
   vibration.count = random.integer(0, n);
   for (std::size_t i = 0; i < static_cast<std::size_t>(vibration.count); ++i) {
     vibration.modes[i] = {static_cast<analysis::ModeKind>(random.integer(0, 5)),

@@ -376,6 +376,7 @@ TEST(ToC, TheSampledLoopHasAllThatIsInIt) {
   vibration.status = analysis::Status::kNotFinite;
   vibration.spectral_radius = numbers();
   vibration.gain_margin = numbers();
+  vibration.assumes = 42;
   vibration.count = 2;
   for (std::size_t i = 0; i < 2; ++i) {
     vibration.modes[i] = {
@@ -387,12 +388,13 @@ TEST(ToC, TheSampledLoopHasAllThatIsInIt) {
   EXPECT_EQ(out.status, static_cast<int>(analysis::Status::kNotFinite));
   EXPECT_EQ(out.spectral_radius, vibration.spectral_radius);
   EXPECT_EQ(out.gain_margin, vibration.gain_margin);
+  EXPECT_EQ(out.assumes, 42u);
   ASSERT_EQ(out.count, 2u);
   lcmtypes::SampledModesSample again;
   lcmtypes::fill(out, again);
   using V = SampledVibration;
   expect_same(again.vibration, vibration, &V::time, &V::tick, &V::position, &V::status,
-              &V::spectral_radius, &V::gain_margin, &V::count);
+              &V::spectral_radius, &V::gain_margin, &V::assumes, &V::count);
   for (std::size_t i = 0; i < 2; ++i) {
     const dashpot_sampled_mode& mode = out.modes[i];
     const SampledVibrationMode& from = vibration.modes[i];

@@ -132,7 +132,7 @@ export function sampledNumbers({frame: {sampled}, setup}, period) {
     ['gain margin', sampled.gain_margin === null ? '∞' : `${number(sampled.gain_margin, 3)} ×`],
     ['largest |z|', sampled.spectral_radius === null ? '–' : sampled.spectral_radius.toFixed(6)],
     ...(setup.arm && setup.arm.missing_rotors ? [['rotors unknown', `${setup.arm.missing_rotors}: the margin is that of an arm without rotors`]] : []),
-    ...(setup.arm && setup.arm.assumes.length ? [['assumes', setup.arm.assumes.join(', ')]] : []),
+    ...(sampled.assumes_text.length ? [['assumes', sampled.assumes_text.join(', ')]] : []),
     ['period', period ? `${number(1e3 * period, 3)} ms` : '–']]);
 }
 
