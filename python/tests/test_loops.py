@@ -1,19 +1,201 @@
-"""The gain margin of an arm in a sampled loop beside numpy, on mass matrix, Jacobian and gradient of
-gravity by Pinocchio."""
+"""One loop: all commands and Python say the same modes and gain margins of the same arm, and the
+margins are those of numpy on mass matrix, Jacobian and gradient of gravity by Pinocchio."""
+
+import http.client
+import json
+import signal
+import subprocess
 
 import numpy as np
 import pytest
 
 import dashpot
 
-pin = pytest.importorskip("pinocchio")
-linalg = pytest.importorskip("scipy.linalg")
+try:
+    import pinocchio as pin
+    from scipy import linalg
+except ImportError:
+    pin = linalg = None
 
 SLOWEST = 1  # rad/s: what is slower does not count in a margin
 STEP = 1.25  # from one factor to the next that is tried
 ARMS = {"panda": ("panda_link0", "panda_hand_tcp"), "iiwa14": ("iiwa_link_0", "iiwa_link_ee_kuka"),
         "ur5": ("base_link", "ee_link"), "fr3": ("fr3_link0", "fr3_hand_tcp"),
         "gen3": ("base_link", "end_effector_link"), "xarm7": ("link_base", "link_eef")}
+
+
+def words(values):
+    return ",".join(repr(float(value)) for value in values)
+
+
+def said(program, *options):
+    """What the program says in JSON; None where it says no."""
+    done = subprocess.run([program, *map(str, options), "--json"], capture_output=True, text=True)
+    assert done.returncode in (0, 1, 2), done.stderr
+    return json.loads(done.stdout) if done.returncode == 0 else None
+
+
+def said_by_page(program, config, q):
+    """The answer of `dashpot tune` to the design that it has of a configuration."""
+    server = subprocess.Popen([program, "tune", config, "--port", "0", "--q", words(q)],
+                              stdout=subprocess.PIPE, text=True)
+    try:
+        host = server.stdout.readline().split("/")[2]
+
+        def ask(method, path, body=None, **headers):
+            connection = http.client.HTTPConnection(host, timeout=60)
+            connection.request(method, path, body, headers)
+            return json.loads(connection.getresponse().read())
+
+        setup = ask("GET", "/setup")
+        body = json.dumps({"q": list(q), "place": "tip/0", "design": setup["designs"][0]})
+        return ask("POST", "/design", body, **{"Content-Type": "application/json",
+                                               "X-Dashpot-Token": setup["token"]})
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.wait()
+        server.stdout.close()
+
+
+def any_case(rng, number, root):
+    """Configuration and posture of any arm, with drives, gears, payload, friction or without."""
+    name = list(ARMS)[number % len(ARMS)]
+    n = 6 if name == "ur5" else 7
+    path, (base, tip) = str(root / f"sim/models/{name}.urdf"), ARMS[name]
+    robot = {"urdf": path, "base": base, "tip": tip,
+             "viscous_friction": (rng.uniform(0.02, 0.5, n) * (number % 3 > 0)).tolist()}
+    if number % 4 < 3:
+        robot["reflected_inertia"] = rng.uniform(0.05, 0.4, n).tolist()
+    if number % 8 == 1:
+        robot |= {"gear_stiffness": rng.uniform(5e3, 2e4, n).tolist(),
+                  "gear_damping": rng.uniform(5, 20, n).tolist()}
+    if number % 5 < 2:
+        robot["payload"] = {"mass": rng.uniform(0.2, 2)}
+    units = np.repeat([1, 0.05], 3)
+    gains = {"joint": {"stiffness": np.exp(rng.uniform(2, 5, n)).tolist(),
+                       "damping": np.exp(rng.uniform(-2, 2, n)).tolist()},
+             "task": {"stiffness": (units * np.exp(rng.uniform(4, 7, 6))).tolist(),
+                      "damping": (units * np.exp(rng.uniform(1, 4, 6))).tolist(),
+                      "frame": "tool" if number % 10 == 3 else "base"},
+             "null_space": {"stiffness": (rng.uniform(1, 10, n) * (number % 2)).tolist(),
+                            "damping": rng.uniform(0.1, 2, n).tolist()}}
+    config = {"robot": robot, "gains": gains,
+              "control": {"period": 1e-3 * int(rng.integers(1, 5)),
+                          "mode": "joint" if number % 3 == 0 else "cartesian"},
+              "limits": {"gain_margin": 1},
+              "analysis": {"sampled": {"delay": int(rng.integers(0, 5)),
+                                       "cutoff": rng.uniform(30, 100) * (number % 7 == 0)}},
+              "integral": {"time": rng.uniform(1, 3)} if number % 9 == 0 else {}}
+    arm = dashpot.Robot.from_urdf(path, base, tip)
+    lower, upper = np.maximum(arm.lower, -3), np.minimum(arm.upper, 3)
+    reach = np.minimum(1.2, 0.4 * (upper - lower))
+    return config, (lower + upper) / 2 + reach * rng.uniform(-1, 1, n)
+
+
+def keywords_of(config):
+    """Those of from_urdf and of audit for a configuration."""
+    robot = {key: value for key, value in config["robot"].items()
+             if key not in ("urdf", "base", "tip", "payload")}
+    robot["payload_mass"] = config["robot"].get("payload", {}).get("mass", 0)
+    gains, joint = config["gains"], config["control"]["mode"] == "joint"
+    if joint:
+        given = {f"joint_{key}": gains["joint"][key] for key in ("stiffness", "damping")}
+    else:
+        given = {f"{part.split('_')[0]}_{key}": gains[part][key] for part in ("task", "null_space")
+                 for key in ("stiffness", "damping")} | {"frame": gains["task"]["frame"]}
+    loop = {"period": config["control"]["period"], "integral_time": config["integral"].get("time", 0),
+            **config["analysis"]["sampled"]}
+    return robot, given, loop
+
+
+def options_of(config, loop):
+    """Arm and loop on the command line."""
+    robot = config["robot"]
+    options = ["--urdf", robot["urdf"], "--base", robot["base"], "--tip", robot["tip"]]
+    for key in ("viscous_friction", "reflected_inertia", "gear_stiffness", "gear_damping"):
+        if key in robot:
+            options += [f"--{key.replace('_', '-')}", words(robot[key])]
+    if "payload" in robot:
+        options += ["--payload", repr(robot["payload"]["mass"])]
+    for key, value in loop.items():
+        if value:
+            options += [f"--{key.replace('_', '-')}", repr(value)]
+    return options
+
+
+def same_modes(found, expected):
+    """Eigenvalues, in whatever order those of overdamped modes are paired."""
+    def sorted_of(values):
+        values = np.asarray(values).reshape(-1)
+        return values[np.lexsort((values.imag, np.round(abs(values), 9)))]
+
+    found = [complex(*value) for mode in found for value in mode["eigenvalues"]]
+    found, expected = sorted_of(found), sorted_of(expected)
+    assert len(found) == len(expected)
+    np.testing.assert_allclose(abs(found), abs(expected), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.real, expected.real, rtol=1e-6, atol=1e-6)
+
+
+def same_margin(found, expected):
+    if np.isinf(expected):
+        assert found is None or found == 1e6
+    else:
+        assert found == pytest.approx(expected, rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("part", range(20))
+def test_all_commands_say_the_same(program, root, tmp_path, part):
+    seed = 5510 + part
+    print("seed", seed)
+    rng = np.random.default_rng(seed)
+    designed = rung = 0
+    for number in range(10 * part, 10 * part + 10):
+        config, q = any_case(rng, number, root)
+        robot, gains, loop = keywords_of(config)
+        path = tmp_path / f"{number}.yaml"
+        path.write_text(json.dumps(config))
+        arm = dashpot.Robot.from_urdf(*(config["robot"][key] for key in ("urdf", "base", "tip")), **robot)
+        expected = dashpot.audit(arm, q, **gains, **loop).posture
+        printed = said(program, "audit", *options_of(config, loop), "--gains", path, "--mode",
+                       config["control"]["mode"], "--q", words(q))["posture"]
+        shown = said_by_page(program, path, q)
+        for found in (printed, shown):
+            same_modes(found["modes"], expected.modes.eigenvalues)
+            same_margin(found["gain_margin"], expected.gain_margin)
+            assert found["assumes"] == expected.assumes
+        # The damping that `design` proposes has in an audit the margin that it reports.
+        if "joint_stiffness" in gains:
+            springs = ["--joint-stiffness", words(gains["joint_stiffness"])]
+        else:
+            springs = ["--task-stiffness", words(gains["task_stiffness"]), "--null-damping",
+                       words(gains["null_damping"])]
+        proposed = said(program, "design", *options_of(config, loop), *springs, "--q", words(q),
+                        "--damping-ratio", "0.7", "--margin", "1.01")
+        if proposed is not None:
+            key = "joint" if "joint_stiffness" in gains else "task"
+            other = {f"{key}_stiffness": gains[f"{key}_stiffness"],
+                     f"{key}_damping": proposed.get("task_damping", proposed.get("damping"))}
+            if key == "task":
+                other["null_damping"] = gains["null_damping"]
+            audited = dashpot.audit(arm, q, **other, **loop).posture
+            same_margin(proposed["loop"]["gain_margin"], audited.gain_margin)
+            same_modes(proposed["after"]["modes"], audited.modes.eigenvalues)
+            assert proposed["assumes"] == expected.assumes
+            designed += 1
+        # `run` has the loop of its drives, where the controller takes the gains.
+        if number % 5 or not expected.gain_margin > 1.2:
+            continue
+        sampled = config["analysis"]["sampled"]
+        path.write_text(json.dumps(config | {
+            "simulation": {"drives": dict(sampled)},
+            "scenario": {"duration": 0.02, "start": {"position": q.tolist()}}}))
+        ran = said(program, "run", path, "--fast", "--ring-down")
+        if ran is not None:
+            same_margin(ran["ring_down"]["gain_margin"], expected.gain_margin)
+            assert ran["ring_down"]["assumes"] == expected.assumes
+            rung += 1
+    print("designs:", designed, "ring-downs:", rung)
+    assert designed >= 4
 
 
 def pinocchio_arm(path, base, tip, payload):
@@ -107,6 +289,7 @@ def random_case(rng, number):
     return name, robot, loop
 
 
+@pytest.mark.skipif(pin is None, reason="needs pinocchio and scipy")
 def test_margins_equal_those_of_numpy_on_pinocchio(root):
     seed = 5502
     print("seed", seed)

@@ -61,7 +61,7 @@ TEST(Audit, CountsAnIntegralAndTellsHowItsSlowModesDecay) {
   EXPECT_EQ(slow["posture"]["smallest_ratio"], plain["posture"]["smallest_ratio"]);
   EXPECT_GT(slow["posture"]["gain_margin"], 10);
   const Json quick = with({"--integral-time", "0.8 s"});
-  EXPECT_EQ(quick["posture"]["gain_margin"], 0);
+  EXPECT_LT(quick["posture"]["gain_margin"], 0.01);  // with which motions are too slow to count
   EXPECT_GT(plain["workspace"]["gain_margin"]["worst"], 1);
   EXPECT_LT(quick["workspace"]["gain_margin"]["worst"], 1);
   EXPECT_EQ(with({"--integral-time", "3 s", "--no-margin"})["posture"]["integral_decays"],
