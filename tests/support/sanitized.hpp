@@ -1,4 +1,5 @@
 #pragma once
+#include <chrono>
 #include <cstdlib>
 
 /// 1 under the address, thread or memory sanitizer, which bring their own malloc and make all slow.
@@ -15,6 +16,9 @@
 #endif
 
 namespace dashpot::testing {
+/// How long a test waits for what another thread or program does: only a hang takes so long.
+inline constexpr std::chrono::seconds kHang{120};
+
 /// Whether to leave out what takes long and runs the code of other tests, too: CTest says so where
 /// all is slow, under sanitizers and emulators.
 inline bool quick() {

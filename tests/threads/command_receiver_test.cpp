@@ -1,11 +1,13 @@
 // Good commands come through a bus; hostile senders on the same bus change nothing but counters.
 #include <dashpot/lcmtypes/command_receiver.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <functional>
 #include <future>
 #include <lcm/lcm-cpp.hpp>
 #include <thread>
@@ -99,22 +101,25 @@ class Sender {
   std::vector<command_t> sent_;
 };
 
-/// Waits until the receiver has judged so many messages; false after ten seconds.
-bool wait_for(const CommandReceiver& receiver, std::int64_t judged) {
-  for (int i = 0; i < 10'000; ++i) {
-    if (receiver.tally().accepted() + receiver.tally().rejected() >= judged) return true;
+/// Waits until this is so; false if it is not before a hang is sure.
+bool wait_until(const std::function<bool()>& so) {
+  const auto end = std::chrono::steady_clock::now() + testing::kHang;
+  while (!so()) {
+    if (std::chrono::steady_clock::now() > end) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  return false;
+  return true;
 }
 
-/// Waits until the sequence has come through; false after ten seconds.
+/// Waits until the receiver has judged so many messages.
+bool wait_for(const CommandReceiver& receiver, std::int64_t judged) {
+  return wait_until(
+      [&] { return receiver.tally().accepted() + receiver.tally().rejected() >= judged; });
+}
+
+/// Waits until the sequence has come through.
 bool wait_for_sequence(CommandReceiver& receiver, std::int64_t sequence) {
-  for (int i = 0; i < 10'000; ++i) {
-    if (receiver.fetch() && receiver.command().sequence == sequence) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return false;
+  return wait_until([&] { return receiver.fetch() && receiver.command().sequence == sequence; });
 }
 
 /// Two threads that send what `next` makes for each, every 20 us or so.
@@ -287,10 +292,7 @@ TEST(CommandReceiver, LetsGoOfASilentSender) {
   CommandReceiver receiver(bus, limits);
   Sender sender(*bus, 972);
   ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
-  for (int i = 0; i < 10'000 && receiver.fetch_tally().commander != 0; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  EXPECT_EQ(receiver.fetch_tally().commander, 0);
+  EXPECT_TRUE(wait_until([&] { return receiver.fetch_tally().commander == 0; }));
   EXPECT_EQ(receiver.fetch_tally().accepted(), 1);
 }
 

@@ -6,6 +6,7 @@
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/places.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -18,6 +19,7 @@
 namespace dashpot::tests {
 
 using Clock = std::chrono::steady_clock;
+using testing::kHang;
 
 /// A `dashpot` that runs beside the test, with its output in files.
 class Running {
@@ -95,10 +97,10 @@ class Listener {
     reader_.emplace(bus_, handlers_);
   }
 
-  /// Listens until `done()`; false if it was not within ten seconds.
+  /// Listens until `done()`; false if it is not before a hang is sure.
   template <class Done>
   bool until(const Done& done) {
-    const auto end = Clock::now() + std::chrono::seconds(10);
+    const auto end = Clock::now() + kHang;
     while (!done()) {
       if (Clock::now() > end) return false;
       reader_->wait(50);

@@ -3,6 +3,7 @@
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/apps/run_program.hpp>
 #include <dashpot/tests/support/places.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gmock/gmock.h>
 #include <poll.h>
@@ -313,11 +314,11 @@ class OnTerminal {
     close(terminal_);
   }
 
-  /// Reads until `text` appears; false if it has not within ten seconds.
+  /// Reads until `text` appears; false if it has not before a hang is sure.
   bool wait_for(const std::string& text) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    const auto end = std::chrono::steady_clock::now() + testing::kHang;
     while (shown_.find(text) == std::string::npos) {
-      if (std::chrono::steady_clock::now() > end || !read_some(10'000)) return false;
+      if (std::chrono::steady_clock::now() > end || !read_some()) return false;
     }
     return true;
   }
@@ -325,7 +326,7 @@ class OnTerminal {
   void interrupt() const { EXPECT_EQ(write(terminal_, "\003", 1), 1); }
   /// Reads to the end; the exit status.
   int finish() {
-    while (read_some(10'000)) {
+    while (read_some()) {
     }
     int status = 0;
     waitpid(child_, &status, 0);
@@ -335,9 +336,9 @@ class OnTerminal {
   const std::string& shown() const { return shown_; }
 
  private:
-  bool read_some(int milliseconds) {
+  bool read_some() {
     pollfd ready = {terminal_, POLLIN, 0};
-    if (poll(&ready, 1, milliseconds) <= 0) return false;
+    if (poll(&ready, 1, std::chrono::milliseconds(testing::kHang).count()) <= 0) return false;
     char buffer[4096];
     const ssize_t size = read(terminal_, buffer, sizeof buffer);
     if (size > 0) shown_.append(buffer, static_cast<std::size_t>(size));

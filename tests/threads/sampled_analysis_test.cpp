@@ -4,6 +4,7 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -28,7 +29,7 @@ struct StillArm : testing::LedArm {
   /// Ticks until something new has been found about a tick after `tick_number`.
   const SampledVibration* wait_for(std::uint64_t tick_number) {
     using std::chrono::steady_clock;
-    const auto end = steady_clock::now() + std::chrono::seconds(60);
+    const auto end = steady_clock::now() + testing::kHang;
     while (steady_clock::now() < end) {
       tick();
       const SampledVibration* found = controller.sampled_vibration();

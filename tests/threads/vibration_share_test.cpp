@@ -2,6 +2,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -60,7 +61,7 @@ struct SharedTick {
   /// Ticks, moving or not, until this is so.
   bool wait_until(bool moving, const std::function<bool(const Vibration&)>& so) {
     using std::chrono::steady_clock;
-    const auto end = steady_clock::now() + std::chrono::seconds(60);
+    const auto end = steady_clock::now() + testing::kHang;
     while (!so(led->modes()) && steady_clock::now() < end) {
       std::this_thread::sleep_for(std::chrono::microseconds(500));
       if (moving) led->swing(1e-3 * ++k);

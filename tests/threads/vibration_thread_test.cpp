@@ -1,5 +1,6 @@
 // Modes from a thread of their own: the numbers of those within the tick.
 #include <dashpot/tests/support/led_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -32,7 +33,7 @@ struct SwingingArm : testing::LedArm {
   /// Ticks without a motion, which are nothing new to analyse, until the modes are those of `tick`.
   bool wait_for(std::uint64_t tick_number) {
     using std::chrono::steady_clock;
-    const auto end = steady_clock::now() + std::chrono::seconds(20);
+    const auto end = steady_clock::now() + testing::kHang;
     while (controller.vibration().tick != tick_number && steady_clock::now() < end) {
       std::this_thread::sleep_for(std::chrono::microseconds(100));
       tick(false);

@@ -100,7 +100,7 @@ class Browser:
             raise RuntimeError(str(answer['exceptionDetails']))
         return answer['result'].get('value')
 
-    def until(self, expression, seconds=30):
+    def until(self, expression, seconds=120):
         """Waits until an expression is true; raises RuntimeError if it does not become so."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
