@@ -322,15 +322,15 @@ typedef struct dashpot_sampled_modes {
   double position[DASHPOT_MAX_JOINTS]; /* of that state, rad */
   double spectral_radius;              /* largest |z| of the loop, which is stable below 1 */
   double gain_margin; /* all gains can grow by this factor before the loop is unstable; infinity:
-                         by any factor; below 1: the loop is unstable. Motions slower than 1 rad/s do
-                         not count. NaN, as spectral_radius, if the analysis failed. */
+                         by any factor; below 1: the loop is unstable. Motions slower than 1 rad/s
+                         do not count. NaN, as spectral_radius, if the analysis failed. */
   int32_t status;     /* 0: all modes were found */
   uint32_t count;     /* number of modes, by falling continuous_frequency */
   dashpot_sampled_mode modes[DASHPOT_MAX_JOINTS];
-  uint32_t assumes;   /* what the loop leaves out that the arm may have: a sum of 2 gravity ideal,
-                         4 delay none, 8 rotors unknown, 16 gears rigid, 32 friction none; see
-                         docs/concepts.md */
-  uint32_t reserved;  /* 0 */
+  uint32_t assumes;  /* what the loop leaves out that the arm may have: a sum of 2 gravity ideal,
+                        4 delay none, 8 rotors unknown, 16 gears rigid, 32 friction none; see
+                        docs/concepts.md */
+  uint32_t reserved; /* 0 */
 } dashpot_sampled_modes;
 
 /* Terms of the robot's equation of motion  M(q) q'' + coriolis + gravity = torque + J' wrench, and

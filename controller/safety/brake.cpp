@@ -9,10 +9,10 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kMargin = 10;         // of gain, that the sampled loop keeps
-constexpr double kNearMargin = 3;      // likewise at the edge of an interval
-constexpr double kNear = 0.2;          // t / T: short, so that the law keeps its say
-constexpr double kFullVelocity = 0.8;  // of a velocity limit: the rest is for what nobody expects
+constexpr double kMargin = 10;          // of gain, that the sampled loop keeps
+constexpr double kNearMargin = 3;       // likewise at the edge of an interval
+constexpr double kNear = 0.2;           // t / T: short, so that the law keeps its say
+constexpr double kFullVelocity = 0.85;  // of a velocity limit: the rest is for what nobody expects
 constexpr double kSlowly = 0.5;  // of a velocity limit: what is slower may be pressing on something
 constexpr double kBraking = 0.5;        // of the torque that is left: the rest is for other joints
 constexpr double kLeastBraking = 0.1;   // of a torque limit, whatever the weight

@@ -65,7 +65,7 @@ double loop_lag(const Settings& settings) noexcept;
 /// distance d_i to a position limit less a margin, the acceleration a_i = room_i / (2 M_ii) of half
 /// of the torque that the weight leaves, and the time r_i = max(4 t, t + lag + torque_i /
 /// torque_rate_i) until it is there,
-///     v+_i = min(0.8 velocity_i, sqrt((a_i r_i)^2 + 2 a_i d_i) - a_i r_i),  d_i / r_i if d_i < 0,
+///     v+_i = min(0.85 velocity_i, sqrt((a_i r_i)^2 + 2 a_i d_i) - a_i r_i),  d_i / r_i if d_i < 0,
 /// from which the joint stops before the limit, and likewise v-_i. While the law acts, the
 /// acceleration M^-1 (x' - coriolis) of the model may be at most
 ///     min((v+_i - qd_i) / t, sqrt(2 (v+_i - qd_i) torque_rate_i / M_ii) / s_i)

@@ -162,7 +162,7 @@ TEST_F(BrakeClaims, StopsWithTheLeastConstraintAndNeverFeeds) {
       (status == Status::kOk ? whole : limited) += 1;
       Eigen::MatrixXd most(n, 2);
       for (int i = 0; i < n; ++i) {
-        const double full = 0.8 * any.settings.limits.velocity[i];
+        const double full = 0.85 * any.settings.limits.velocity[i];
         most(i, 0) = std::max(0.0, (full - any.qd[i]) / t);
         most(i, 1) = std::max(0.0, (full + any.qd[i]) / t);
       }
