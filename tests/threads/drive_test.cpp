@@ -46,7 +46,11 @@ class Drive : public ::testing::TestWithParam<Arm> {
     seen = listener.until([&] { return listener.states > 100; });
     if (!seen) return {};
     // The simulated time of the driver.
-    listener.until([&] { return listener.state.utime == 0 || listener.states > 4500; });
+    listener.until([&] {
+      // A command that ends the motion ends the Panda's driver.
+      const bool ended = driving.ended() && (arm.kind == DriverKind::kIiwa || fake.ended());
+      return ended || listener.state.utime == 0 || listener.states > 4500;
+    });
     state = listener.state;
     driving.send(SIGTERM);
     driving.finish();
@@ -312,7 +316,7 @@ TEST_P(Drive, LatchesAfterAGap) {
 TEST_P(Drive, SendsNumbersToADriverThatReportsNone) {
   const Json result = troubled("nan");
   if (!seen) GTEST_SKIP() << kNoMulticast;
-  if (arm.kind == lcmtypes::DriverKind::kPanda) {
+  if (arm.kind == DriverKind::kPanda) {
     EXPECT_THAT(fake_said, HasSubstr("a command expects control mode 0"));
   } else {
     EXPECT_EQ(fake_status, 0) << fake_said;
