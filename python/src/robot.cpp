@@ -23,7 +23,6 @@ using controller::DynamicsResult;
 using controller::Gains;
 using controller::Joint;
 using controller::JointVector;
-using controller::RobotModel;
 using controller::Settings;
 
 JointVector Robot::joint_vector(const char* name, const Eigen::VectorXd& values) const {
