@@ -16,16 +16,16 @@
  * row. Frames: B is the base link, T the tip or the tool's frame. Twists and wrenches have the
  * linear part first, are taken at T's origin, in B's axes.
  *
- * Threads. One thread, the real-time thread, calls dashpot_update, dashpot_stop and dashpot_reset.
- * One other thread at a time, "the other thread" below, calls dashpot_set_setpoint,
- * dashpot_set_gains, dashpot_set_payload, dashpot_limit_tip_speed and dashpot_release. One thread,
- * always the same, calls dashpot_read_snapshot, dashpot_read_modes and dashpot_read_sampled_modes;
- * it may be the real-time thread. None of these calls ever waits for the real-time thread or makes
- * it wait. dashpot_start is called before the loop begins. Any thread may call the remaining
- * functions, but dashpot_destroy only once no other call is under way. Controllers are independent
- * of each other. dashpot_update, dashpot_stop and dashpot_reset never change the text of
- * dashpot_last_error; of the other functions, the first call in a thread may allocate that thread's
- * text.
+ * Threads. One thread, the real-time thread, calls dashpot_update, dashpot_needs_brakes,
+ * dashpot_stop and dashpot_reset. One other thread at a time, "the other thread" below, calls
+ * dashpot_set_setpoint, dashpot_set_gains, dashpot_set_payload, dashpot_limit_tip_speed and
+ * dashpot_release. One thread, always the same, calls dashpot_read_snapshot, dashpot_read_modes and
+ * dashpot_read_sampled_modes; it may be the real-time thread. None of these calls ever waits for
+ * the real-time thread or makes it wait. dashpot_start is called before the loop begins. Any thread
+ * may call the remaining functions, but dashpot_destroy only once no other call is under way.
+ * Controllers are independent of each other. dashpot_update, dashpot_stop and dashpot_reset never
+ * change the text of dashpot_last_error; of the other functions, the first call in a thread may
+ * allocate that thread's text.
  *
  * Every struct begins with struct_size, which the caller sets to the sizeof of the struct; a
  * function refuses any other value. No exception leaves the library. */
@@ -516,12 +516,12 @@ int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* 
 int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes);
 int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes);
 
-/* Returns 1 where the host has to end the motion at once and to engage the robot's own brakes,
- * because no torque is known to be right: with the status of a tick DASHPOT_STATE_FROZEN,
- * DASHPOT_STATE_CONTRADICTORY or DASHPOT_BRAKE_DOUBTED; and, where `fault`
- * (dashpot_snapshot.fault) is not DASHPOT_OK, with DASHPOT_STATE_NOT_FINITE and all after it.
- * Returns 0 otherwise. */
-int32_t dashpot_needs_brakes(int32_t status, int32_t fault);
+/* Returns 1 where, after the last dashpot_update, the host has to end the motion at once and to
+ * engage the robot's own brakes, because no torque is known to be right: with DASHPOT_STATE_FROZEN,
+ * DASHPOT_STATE_CONTRADICTORY or DASHPOT_BRAKE_DOUBTED, and, once the fault has latched, with
+ * DASHPOT_STATE_NOT_FINITE and all after it. Returns 0 otherwise. Called on the real-time thread.
+ */
+int32_t dashpot_needs_brakes(const dashpot_controller* controller);
 
 /* Return a short English text for what a function returned ("torque limited"), and for the kind of
  * a mode ("underdamped"); never NULL. */
@@ -557,7 +557,7 @@ typedef struct dashpot_plugin {
   int32_t (*read_modes)(dashpot_controller*, dashpot_modes*);
   int32_t (*read_sampled_modes)(dashpot_controller*, dashpot_sampled_modes*);
   const char* (*status_text)(int32_t);
-  int32_t (*needs_brakes)(int32_t, int32_t);
+  int32_t (*needs_brakes)(const dashpot_controller*);
   const char* (*kind_text)(int32_t);
 } dashpot_plugin;
 

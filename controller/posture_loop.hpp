@@ -140,7 +140,7 @@ class PostureLoop {
   Settings settings_;
   JointVector friction_left_;
   DesignedDamping damping_;
-  // Of the last closed_loop:
+  // The latest closed_loop:
   analysis::DampingLevel level_;
   JointVector q_;
   PassivePart outside_;

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/settings.hpp>
 
 #include <stdexcept>
@@ -22,5 +23,21 @@ class InvalidSettings : public std::invalid_argument {
 /// Throws InvalidSettings, with key, value and unit, unless all sizes are n, all numbers are finite
 /// and in their ranges, and all gains are symmetric positive semidefinite.
 void validate(const Settings& settings, int n);
+
+/// How the brake stops an arm that is as its model: each joint alone from 0.9 of its velocity
+/// limit, with the mass matrix and weight of one posture, rigid gears, and no friction.
+struct Stopping {
+  JointVector time;  ///< n, s, until no joint is faster than a tenth of that; at most 2 s
+  JointVector way;   ///< n, rad, m for prismatic joints, that the joint goes in this time
+};
+
+/// Finds that at q (n, rad), with the limits, period and delay of `settings`. Takes about a
+/// millisecond a joint.
+Stopping stopping(const RobotModel& model, const Settings& settings, const JointVector& q);
+
+/// One line that names the joint that stops last, if that takes more than 0.25 s and more than
+/// half as long again as with faster torques, and a limits.torque_rate that would do; empty if
+/// none does.
+std::string slow_stop(const RobotModel& model, const Settings& settings, const JointVector& q);
 
 }  // namespace dashpot::controller

@@ -76,6 +76,14 @@ inline bool latches(Status status) noexcept {
   return status > Status::kFaultLatched && status < Status::kStateNotFinite;
 }
 
+/// Returns true if a tick's status, with the fault that is latched, asks for the robot's brakes: no
+/// torque is known to be right, or the state is lost for so long that a fault has latched.
+inline bool needs_brakes(Status status, Status fault) noexcept {
+  return status == Status::kStateFrozen || status == Status::kStateContradictory ||
+         status == Status::kBrakeDoubted ||
+         (status >= Status::kStateNotFinite && fault != Status::kOk);
+}
+
 /// Returns a short English text: "ok", "torque limited", ...
 const char* to_text(Status status) noexcept;
 

@@ -239,7 +239,7 @@ class Arm {
 
   /// Once for each fault.
   void tell_of_brakes() noexcept {
-    const bool needed = dashpot_needs_brakes(snapshot_.status, snapshot_.fault) != 0;
+    const bool needed = dashpot_needs_brakes(controller_.get()) != 0;
     if (needed && !told_) {
       std::fprintf(stderr, "dashpot.impedance: %s: a robot would have to engage its brakes\n",
                    dashpot_status_text(snapshot_.status));

@@ -19,8 +19,8 @@ using controller::InputError;
 /// n entries; analysis::to_joint_space checks the matrices.
 struct SystemEntry {
   analysis::TaskImpedance impedance;  ///< with all that the keys add
-  /// What the robot has of a sampled loop: its friction, which is a part of the damping, its gears,
-  /// and of an arm the gravity that is compensated.
+  /// The robot's part of a sampled loop: friction, which the damping contains, gears, and, of an
+  /// arm, the gravity that is compensated.
   analysis::SampledLoop loop;
   std::optional<Eigen::VectorXd> initial_position;  ///< q(0), n
   std::optional<Eigen::VectorXd> initial_velocity;  ///< q'(0), n

@@ -54,7 +54,7 @@ analysis::LoopLimit limit_of(const SystemEntry& entry, const DesignOptions& opti
   return limit;
 }
 
-/// What is left out of that loop. Of matrices no gravity is known.
+/// Assumptions of the loop in which the design is judged. Matrices alone say nothing of gravity.
 std::vector<std::string> assumed(const DesignOptions& options,
                                  const std::optional<controller::RobotModel>& model) {
   controller::LoopTiming timing = options.timing;

@@ -178,7 +178,7 @@ bool DriveSession::take(const DriverStatus& status, std::int64_t arrived, std::i
   // The message wants one; it is what the driver itself commands with --torque_only.
   command.position = options_.driver == DriverKind::kIiwa ? last_position_ : JointVector();
   command.torque = torque_;
-  if (controller_.needs_brakes(code, journal_.record.fault)) engage(code, command);
+  if (controller_.needs_brakes()) engage(code, command);
   return true;
 }
 

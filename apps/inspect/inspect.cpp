@@ -9,7 +9,7 @@
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/rotors.hpp>
-#include <dashpot/controller/stopping.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>

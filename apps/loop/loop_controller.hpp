@@ -27,7 +27,7 @@ class LoopController {
   /// Stops the arm: the set-point is given up, until there is a new one.
   virtual void stop() noexcept = 0;
   /// Whether a status of update() asks the host to engage the robot's own brakes.
-  virtual bool needs_brakes(std::int32_t status, std::int32_t fault) const noexcept = 0;
+  virtual bool needs_brakes() const noexcept = 0;
   /// Returns the snapshot of the last tick.
   virtual const dashpot_snapshot& snapshot() noexcept = 0;
   /// Returns modes that are newer than those returned last; null if there are none.

@@ -68,7 +68,7 @@ class NullController : public LoopController {
   }
 
   void stop() noexcept override {}
-  bool needs_brakes(std::int32_t, std::int32_t) const noexcept override { return false; }
+  bool needs_brakes() const noexcept override { return false; }
   const dashpot_snapshot& snapshot() noexcept override { return snapshot_; }
 
   const dashpot_modes* new_modes() noexcept override {

@@ -41,9 +41,7 @@ class PluginController : public LoopController {
   }
 
   void stop() noexcept override { plugin_.stop(handle_.get()); }
-  bool needs_brakes(std::int32_t status, std::int32_t fault) const noexcept override {
-    return plugin_.needs_brakes(status, fault) != 0;
-  }
+  bool needs_brakes() const noexcept override { return plugin_.needs_brakes(handle_.get()) != 0; }
 
   const dashpot_snapshot& snapshot() noexcept override {
     plugin_.read_snapshot(handle_.get(), &snapshot_);

@@ -58,6 +58,9 @@ struct HostedController {
   void reset(const JointVector& torque) noexcept;
   /// Gives the set-point up, until there is a new one.
   void stop() noexcept;
+  bool needs_brakes() const noexcept {
+    return controller::needs_brakes(controller_.snapshot().status, controller_.snapshot().fault);
+  }
 
  private:
   void forget_setpoint() noexcept;

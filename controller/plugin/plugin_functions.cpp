@@ -4,7 +4,7 @@
 #include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
-#include <dashpot/controller/stopping.hpp>
+#include <dashpot/controller/settings_check.hpp>
 
 #include <algorithm>
 #include <array>
@@ -373,12 +373,8 @@ const char* dashpot_status_text(int32_t status) {
   return to_text(static_cast<Status>(status));
 }
 
-int32_t dashpot_needs_brakes(int32_t status, int32_t fault) {
-  const bool lost = status >= DASHPOT_STATE_NOT_FINITE && fault != DASHPOT_OK;
-  return lost || status == DASHPOT_STATE_FROZEN || status == DASHPOT_STATE_CONTRADICTORY ||
-                 status == DASHPOT_BRAKE_DOUBTED
-             ? 1
-             : 0;
+int32_t dashpot_needs_brakes(const dashpot_controller* controller) {
+  return controller != nullptr && controller->needs_brakes() ? 1 : 0;
 }
 
 const char* dashpot_kind_text(int32_t kind) {

@@ -1,6 +1,6 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/safety/safety_filter.hpp>
-#include <dashpot/controller/stopping.hpp>
+#include <dashpot/controller/settings_check.hpp>
 
 #include <algorithm>
 #include <cmath>

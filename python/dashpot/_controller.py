@@ -263,8 +263,6 @@ class Controller:
             torque, status = controller.update(tick * controller.period, q, qd)
     """
 
-    _LOST = 0.1  # s without a good state
-
     def __init__(self, config: str | os.PathLike[str] | Mapping[str, Any]) -> None:
         """Takes the path of a configuration file, or its contents as a dict, in which a relative
         path of a URDF begins at the working directory. controller/examples/panda.yaml has all keys.
@@ -276,7 +274,6 @@ class Controller:
             self._core = _core.Controller.from_text(text, os.getcwd())
         else:
             self._core = _core.Controller.from_file(os.fspath(config))
-        self._lost = 0  # ticks without a good state
         self.joints: int = self._core.joints
         """n."""
         self.joint_names: tuple[str, ...] = tuple(self._core.joint_names())
@@ -304,13 +301,10 @@ class Controller:
             None if external_wrench is None else np.asarray(external_wrench, dtype=np.float64))
         return torque, Status(status)
 
-    def needs_brakes(self, status: int) -> bool:
-        """Called after each tick with its status: True if the host has to end the motion at once
-        and to engage the robot's own brakes, because no torque is known to be right, or no good
-        state came for 0.1 s."""
-        self._lost = self._lost + 1 if status >= Status.STATE_NOT_FINITE else 0
-        latched = status if self._lost * self.period > self._LOST else Status.OK
-        return _core.needs_brakes(status, latched)
+    def needs_brakes(self) -> bool:
+        """True if, after the last update, the host has to end the motion at once and to engage the
+        robot's own brakes: no torque is known to be right, or the state is lost."""
+        return self._core.needs_brakes()
 
     def start(self, q: npt.ArrayLike, torque: npt.ArrayLike | None = None) -> None:
         """Prepares the loop with the robot at rest at q (n, rad), where it applies `torque` (n, N m;

@@ -188,7 +188,7 @@ class Session:
                 if self._stop:
                     return self._stop
                 continue
-            if self.controller.needs_brakes(status):
+            if status >= latched and self.controller.needs_brakes():
                 self._engage(franka, control, torques, torque.tolist(), status)
             left = 1.0 if not self._stop else 0.0 if self._now else self._ending.left(ns, q)
             torques.motion_finished = left == 0

@@ -171,7 +171,7 @@ class ModesNode:
             self.ended = self.ended or self._stop
             return
         left = self._ending.left(time, self._q) if self._stop else 1.0
-        if self.controller.needs_brakes(status) and not (
+        if self.controller.needs_brakes() and not (
                 status >= Status.STATE_NOT_FINITE and torque.any()):  # the last weight, for 2 s
             # A topic has no brakes: nothing pulls any more.
             self._fail(f"{status.text}: the last torque was zero")

@@ -227,6 +227,12 @@ void stop(Host& host) {
   dashpot_stop(host.get());
 }
 
+bool needs_brakes(Host& host) {
+  const nb::gil_scoped_release release;
+  const std::lock_guard lock(host.loop);
+  return dashpot_needs_brakes(host.get()) != 0;
+}
+
 void set_setpoint(Host& host, bool cartesian, const OptionalMatrix& joint_position,
                   const OptionalMatrix& tip_pose, const OptionalMatrix& wrench,
                   std::optional<std::int64_t> time) {
@@ -336,8 +342,6 @@ nb::dict loop_of(const Host& host) {
 
 void add_controller(nb::module_& m) {
   m.def("status_text", [](int status) { return dashpot_status_text(status); });
-  m.def("needs_brakes",
-        [](int status, int fault) { return dashpot_needs_brakes(status, fault) != 0; });
   nb::class_<Host>(m, "Controller", "dashpot_controller of controller/plugin.h")
       .def_static("from_text", &from_text, nb::call_guard<nb::gil_scoped_release>())
       .def_static("from_file", &from_file, nb::call_guard<nb::gil_scoped_release>())
@@ -356,6 +360,7 @@ void add_controller(nb::module_& m) {
       .def("start", &start, nb::arg("q"), nb::arg("torque").none())
       .def("reset", &reset, nb::arg("torque").none())
       .def("stop", &stop)
+      .def("needs_brakes", &needs_brakes)
       .def("check_setpoint", &check_setpoint, nb::arg("cartesian"),
            nb::arg("joint_position").none(), nb::arg("tip_pose").none(), nb::arg("wrench").none())
       .def("set_setpoint", &set_setpoint, nb::arg("cartesian"), nb::arg("joint_position").none(),

@@ -236,15 +236,15 @@ def test_what_moves_on_delays_the_end_by_a_second_at_most(run):
     assert len(robot.written) == 1001 + 1000 + 200
 
 
-@pytest.mark.parametrize("ticks", [50, 1000])
-def test_a_state_that_is_lost_for_a_tenth_of_a_second_ends_the_motion(run, ticks):
+@pytest.mark.parametrize("ticks", [5, 1000])
+def test_a_state_that_is_lost_ends_the_motion_when_its_fault_latches(run, ticks):
     robot = MovingRobot(events={1000: lambda robot: setattr(robot, "lost", ticks)})
     report = run(robot, duration=1.5)
-    if ticks == 50:
-        assert report["failure"] is None and report["faults"] == 1
+    if ticks == 5:
+        assert report["failure"] is None and report["faults"] <= 1
     else:
         assert report["failure"].startswith("state not finite")
-        assert 1099 <= len(robot.finished) <= 1104 and robot.finished[-1]
+        assert 1010 <= len(robot.finished) <= 1013 and robot.finished[-1]
 
 
 def test_an_arm_that_needs_its_brakes_ends_the_motion_at_once(run, capfd):

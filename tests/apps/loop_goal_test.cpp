@@ -29,7 +29,7 @@ class Notes : public LoopController {
     return DASHPOT_OK;
   }
   void stop() noexcept override {}
-  bool needs_brakes(std::int32_t, std::int32_t) const noexcept override { return false; }
+  bool needs_brakes() const noexcept override { return false; }
   const dashpot_snapshot& snapshot() noexcept override { return snapshot_; }
   const dashpot_modes* new_modes() noexcept override { return nullptr; }
   std::int32_t start(const JointVector&, std::string&) override { return DASHPOT_OK; }

@@ -1,7 +1,7 @@
-// What a stop is promised to take, beside closed forms for one joint.
+// The time and way that a stop is promised to take, beside closed forms for one joint.
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/posture.hpp>
-#include <dashpot/controller/stopping.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
 
 #include <gmock/gmock.h>

@@ -143,7 +143,7 @@ class Plugin(c.Structure):
                 ("read_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Modes))),
                 ("read_sampled_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(SampledModes))),
                 ("status_text", c.CFUNCTYPE(c.c_char_p, c.c_int32)),
-                ("needs_brakes", c.CFUNCTYPE(c.c_int32, c.c_int32, c.c_int32)),
+                ("needs_brakes", c.CFUNCTYPE(c.c_int32, Handle)),
                 ("kind_text", c.CFUNCTYPE(c.c_char_p, c.c_int32))]
 
 

@@ -74,7 +74,7 @@ inline const std::vector<Room>& rooms() {
       {"controller/yaml", 1, {}, {kEigen, "yaml-cpp/"}},
       {"controller/motion", 2, {}, {kEigen}},
       {"controller/law", 3, {}, {kAnalysis, kEigen}},
-      {"controller/safety", 3, {"setpoint_check", "settings_check", "stopping"}, {kEigen}},
+      {"controller/safety", 3, {"setpoint_check", "settings_check"}, {kEigen}},
       {"controller/vibration",
        4,
        {"posture_loop", "rotors", "elastic_joints"},

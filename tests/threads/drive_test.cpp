@@ -311,8 +311,7 @@ TEST_P(Drive, LatchesAfterAGap) {
   EXPECT_GE(result["statuses"]["lost"].get<int>(), 90);
 }
 
-/// What is sent stays finite: the fake driver dies of anything else. It ends the motion as it is
-/// told to.
+/// Commands stay finite: the fake driver dies of anything else. The last one ends the motion.
 TEST_P(Drive, SendsNumbersToADriverThatReportsNone) {
   const Json result = troubled("nan");
   if (!seen) GTEST_SKIP() << kNoMulticast;

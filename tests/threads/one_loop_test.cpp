@@ -103,7 +103,7 @@ AuditOptions stated(const Settings& settings, Mode mode) {
   return options;
 }
 
-/// What the loop at a posture says.
+/// Modes and margin of the loop at a posture.
 struct Said {
   analysis::Spectrum<> modes;
   analysis::SampledSpectrum sampled;

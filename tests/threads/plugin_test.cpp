@@ -268,17 +268,37 @@ TEST(Plugin, StopsUntilThereIsANewSetpoint) {
 }
 
 TEST(Plugin, NamesTheStatusesThatNeedTheRobotsBrakes) {
-  std::set<std::int32_t> always, latched;
-  for (std::int32_t status = -300; status < 300; ++status) {
-    if (plugin().needs_brakes(status, DASHPOT_OK) != 0) always.insert(status);
-    if (plugin().needs_brakes(status, DASHPOT_TIME_GAP) != 0) latched.insert(status);
+  using controller::Status;
+  const std::set<Status> doubts{Status::kStateFrozen, Status::kStateContradictory,
+                                Status::kBrakeDoubted};
+  for (int code = DASHPOT_OK; code <= DASHPOT_NOT_FINITE; ++code) {
+    const auto status = static_cast<Status>(code);
+    const bool doubted = doubts.count(status) > 0;
+    EXPECT_EQ(controller::needs_brakes(status, Status::kOk), doubted) << code;
+    EXPECT_EQ(controller::needs_brakes(status, Status::kTimeGap),
+              doubted || status >= Status::kStateNotFinite)
+        << code;
   }
-  const std::set<std::int32_t> doubts{DASHPOT_STATE_FROZEN, DASHPOT_STATE_CONTRADICTORY,
-                                      DASHPOT_BRAKE_DOUBTED};
-  EXPECT_EQ(always, doubts);
-  for (std::int32_t status : doubts) EXPECT_EQ(latched.erase(status), 1U);
-  EXPECT_EQ(*latched.begin(), DASHPOT_STATE_NOT_FINITE);  // and what is worse: no known status
-  EXPECT_EQ(latched.count(DASHPOT_NOT_FINITE), 1U);
+}
+
+TEST(Plugin, NeedsTheRobotsBrakesWhenTheFaultOfALostStateLatches) {
+  EXPECT_EQ(plugin().needs_brakes(nullptr), 0);
+  Host host(create(panda()), panda_posture());
+  dashpot_controller* const arm = host.controller.get();
+  EXPECT_EQ(plugin().needs_brakes(arm), 0);
+  host.tick();
+  EXPECT_EQ(plugin().needs_brakes(arm), 0);
+  host.velocity[2] = std::numeric_limits<double>::quiet_NaN();
+  for (int tick = 1; tick <= 30; ++tick) {
+    EXPECT_EQ(host.tick(), DASHPOT_STATE_NOT_FINITE);
+    const bool latched = host.snapshot().fault != DASHPOT_OK;
+    EXPECT_EQ(plugin().needs_brakes(arm), latched ? 1 : 0) << tick;
+    EXPECT_EQ(latched, tick > 10) << tick;  // watchdog.longest_gap
+  }
+  host.velocity[2] = 0;
+  for (int tick = 0; tick < 100; ++tick) host.tick();
+  EXPECT_EQ(host.snapshot().fault, DASHPOT_STATE_NOT_FINITE);  // it holds the arm again
+  EXPECT_EQ(plugin().needs_brakes(arm), 0);
 }
 
 TEST(Plugin, IsResetToHoldWhereTheRobotIs) {
