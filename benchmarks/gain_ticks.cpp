@@ -62,6 +62,7 @@ Settings settings_for(const RobotModel& model, double share, bool all_terms) {
   Settings settings = default_settings(model);
   settings.analysis.share = share;
   if (all_terms) settings.task_terms = {Load::kToolWrench, true};
+  settings.limits.beyond_model = true;
   settings.limits.velocity.setConstant(1e6);  // so that states may jump ...
   settings.limits.tip_velocity = 1e6;
   settings.watchdog.feedback = 0;

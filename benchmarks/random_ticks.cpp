@@ -28,6 +28,7 @@ Settings settings_for(const RobotModel& model, bool modes) {
   Settings settings = default_settings(model);
   settings.analysis.where = modes ? Analysis::Where::kInline : Analysis::Where::kOff;
   settings.feed_forward.friction = true;
+  settings.limits.beyond_model = true;
   settings.limits.velocity.setConstant(1e6);  // so that states may jump
   settings.limits.tip_velocity = 1e6;
   settings.limits.torque *= 1e3;  // and torques with them

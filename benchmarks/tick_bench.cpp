@@ -126,6 +126,7 @@ class Loop {
     settings.feed_forward.friction = true;
     if (extra.steady) settings.feed_forward.friction_at = FeedForward::FrictionAt::kMeasured;
     if (extra.steady) settings.integral.time = 1;
+    settings.limits.beyond_model = true;
     settings.limits.torque *= 1e3;  // so that no limit is at work
     settings.limits.torque_rate *= 1e6;
     settings.limits.velocity *= 1e3;

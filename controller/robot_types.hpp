@@ -107,8 +107,10 @@ struct Gains {
 struct Setpoint {
   std::int64_t time = 0;  ///< ns, when it was given, on the clock of RobotState::time
   Mode mode = Mode::kJoint;
-  JointVector joint_position;        ///< goal of mode kJoint; posture of mode kCartesian
-  Pose tip_pose;                     ///< goal of mode kCartesian
+  JointVector joint_position;  ///< goal of mode kJoint; posture of mode kCartesian
+  /// Goal of mode kCartesian; refused there until a position is set.
+  Pose tip_pose{Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()),
+                Eigen::Matrix3d::Identity()};
   Vector6 wrench = Vector6::Zero();  ///< that the tip exerts in addition, N and N m
   Gains gains;
 };

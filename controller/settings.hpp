@@ -131,6 +131,9 @@ struct Limits {
   /// itself takes any gains, and lowers damping ratios where the loop does not bear them with this
   /// margin; 1 lowers none. See DesignedDamping.
   double gain_margin = 2;
+  /// Whether settings beyond the model's limits, and lengths, angles and times that no arm needs,
+  /// are accepted. See validate.
+  bool beyond_model = false;
 };
 
 inline constexpr std::size_t kMaxWalls = 8;

@@ -21,8 +21,15 @@ class InvalidSettings : public std::invalid_argument {
 };
 
 /// Throws InvalidSettings, with key, value and unit, unless all sizes are n, all numbers are finite
-/// and in their ranges, and all gains are symmetric positive semidefinite.
-void validate(const Settings& settings, int n);
+/// and in their ranges, and all gains are symmetric positive semidefinite. Without
+/// Limits::beyond_model it also refuses limits of torque, velocity and position beyond the model's,
+/// speeds and errors of the tip beyond what its joints and links allow, and times that are hardly
+/// in seconds; what it says names the likely unit.
+void validate(const Settings& settings, const RobotModel& model);
+
+/// One line that asks whether the rotations stand first, where the stiffness of the task (6 x 6) is
+/// such that a tip on a lever of twice the arm's reach would turn harder than it moves; else empty.
+std::string doubtful_order(const RobotModel& model, const Matrix6& task_stiffness);
 
 /// How the brake stops an arm that is as its model: each joint alone from 0.9 of its velocity
 /// limit, with the mass matrix and weight of one posture, rigid gears, and no friction.

@@ -6,6 +6,7 @@
 #include <dashpot/apps/web/receptance.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/settings_check.hpp>
 
 #include <algorithm>
@@ -164,7 +165,7 @@ TunedLoop::TunedLoop(const TunedArm& arm, const TunedDesign& design)
       audit_(arm.model(), design.stated),
       gears_(controller::elastic_joints(arm.model())) {
   if (!design.designed()) return;
-  validate(design.settings, arm.model().dof());
+  validate(design.settings, arm.model());
 }
 
 TunedLoop::There TunedLoop::there(const JointVector& q) const {
@@ -303,6 +304,9 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
     result["limit"] = limit_json(loop.system, loop.sampled, here.gain_margin, model);
   }
   const bool task = design_.stated.mode == Mode::kCartesian;
+  if (task && design_.designed() && !controller::lost_directions(model, q).empty()) {
+    result["gains"]["damping"] = nullptr;  // it would fit no posture beside this one
+  }
   if (!design_.stated.inertia_blocks) {
     result["sensitivity"] = sensitivity_json(loop.system, loop.spectrum, gears_,
                                              task ? &*loop.parts.jacobian : nullptr);

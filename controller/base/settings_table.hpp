@@ -55,6 +55,7 @@ void for_each_setting(Struct& settings, Visitor&& visit) {
         limits.external_torque);
   visit(Setting{"limits.external_force", "N", "", kPositive, kInfinity}, limits.external_force);
   visit(Setting{"limits.gain_margin", "", "", {1, true, 1000}}, limits.gain_margin);
+  visit(Setting{"limits.beyond_model"}, limits.beyond_model);
 
   auto& motion = settings.motion;
   visit(Setting{"motion.velocity", "rad/s", "m/s", kPositive}, motion.velocity);

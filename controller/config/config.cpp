@@ -199,12 +199,12 @@ std::string key_of_setting(std::string setting) {
 }
 
 /// Throws an InputError about the first setting that the controller would refuse, in either mode.
-void check(const Settings& settings, int n, const YamlNode& document) {
+void check(const Settings& settings, const RobotModel& model, const YamlNode& document) {
   Settings other = settings;
   other.initial.mode = settings.initial.mode == Mode::kJoint ? Mode::kCartesian : Mode::kJoint;
   try {
-    validate(settings, n);
-    validate(other, n);
+    validate(settings, model);
+    validate(other, model);
   } catch (const InvalidSettings& error) {
     const std::string key = key_of_setting(error.key());
     std::string reason = error.what();
@@ -226,7 +226,7 @@ Config read_config(const YamlNode& document, const std::filesystem::path& direct
   read_gains(root, model, GainPairs::kTogether, settings.initial.gains);
   for_each_setting(settings, reader);
   read_walls(reader.section("limits"), settings.limits.walls);
-  check(settings, model.dof(), document);
+  check(settings, model, document);
   return {robot, model, settings};
 }
 

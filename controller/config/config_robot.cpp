@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <limits>
+#include <numbers>
 
 namespace dashpot::controller {
 namespace {
@@ -23,6 +24,9 @@ void read_tool(const YamlMapping& robot, Pose& tool) {
   Vector3d rpy = Vector3d::Zero();
   read_vector3(keys, "position", "m", tool.position);
   read_vector3(keys, "rpy", "rad", rpy);
+  if (rpy.cwiseAbs().maxCoeff() > 2 * std::numbers::pi) {
+    throw keys.error("rpy", "has an angle beyond a turn, in rad; degrees are written as '90 deg'");
+  }
   tool.rotation = (AngleAxisd(rpy.z(), Vector3d::UnitZ()) * AngleAxisd(rpy.y(), Vector3d::UnitY()) *
                    AngleAxisd(rpy.x(), Vector3d::UnitX()))
                       .toRotationMatrix();

@@ -3,7 +3,7 @@
 
 namespace dashpot::controller {
 Controller::Controller(const RobotModel& model, const Settings& settings)
-    : core_((validate(settings, model.dof()), std::make_unique<ControllerCore>(model, settings))) {}
+    : core_((validate(settings, model), std::make_unique<ControllerCore>(model, settings))) {}
 Controller::~Controller() = default;
 Controller::Controller(Controller&&) noexcept = default;
 Controller& Controller::operator=(Controller&&) noexcept = default;

@@ -125,6 +125,18 @@ std::int32_t read_joints(const dashpot_controller* controller, const double* giv
   return values.allFinite() ? DASHPOT_OK : finish(DASHPOT_WRONG_VALUE);
 }
 
+/// Whether the arm can be at q. DASHPOT_OK or why not.
+std::int32_t check_place(const dashpot_controller& controller, const JointVector& q) noexcept {
+  constexpr double kOutside = 0.1;  // rad (m), as at the start
+  if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
+  try {
+    const std::string outside = outside_limits(controller.model, q, kOutside);
+    return outside.empty() ? DASHPOT_OK : finish(DASHPOT_WRONG_VALUE, outside.c_str());
+  } catch (...) {
+    return finish(DASHPOT_WRONG_VALUE, "unknown failure");
+  }
+}
+
 /// Whether there is a struct to write to.
 template <class Struct>
 std::int32_t check_result(const dashpot_controller* controller, const Struct* result) noexcept {
@@ -277,8 +289,8 @@ int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains*
   } else if (!controller->judgement.where(q)) {
     return finish(DASHPOT_NOTHING_YET);
   }
-  if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
-  return judge(*controller, wanted, q, margin);
+  const std::int32_t place = position == nullptr ? DASHPOT_OK : check_place(*controller, q);
+  return place != DASHPOT_OK ? place : judge(*controller, wanted, q, margin);
 }
 
 int32_t dashpot_evaluate(const dashpot_controller* controller, const double* position,
@@ -309,6 +321,8 @@ int32_t dashpot_analyze(const dashpot_controller* controller, const double* posi
   }
   Gains wanted = controller->settings.initial.gains;
   if (gains != nullptr) problem = read_gains(gains, controller->n, wanted);
+  if (problem != DASHPOT_OK) return problem;
+  problem = check_place(*controller, q);
   if (problem != DASHPOT_OK) return problem;
   try {
     VibrationTask task;

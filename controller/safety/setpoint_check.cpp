@@ -110,7 +110,7 @@ SetpointFault check_setpoint(const Setpoint& setpoint, const Limits& limits,
   }
   if (cartesian) {
     if (!(setpoint.tip_pose.position.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= 1e6)) {
-      return {"tip_pose.position", "is not finite, or beyond 1e6 m"};
+      return {"tip_pose.position", "is not set, not finite, or beyond 1e6 m"};
     }
     if (!(rotation_defect(setpoint.tip_pose.rotation) <= 1e-6)) {
       return {"tip_pose.rotation", "is not a rotation matrix"};

@@ -1,11 +1,17 @@
 #include <dashpot/controller/base/settings_table.hpp>
+#include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/controller/model/moved_links.hpp>
 #include <dashpot/controller/safety/brake.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/settings_check.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <sstream>
+#include <string_view>
+#include <vector>
 
 namespace dashpot::controller {
 namespace {
@@ -60,6 +66,103 @@ class RangeCheck {
   Eigen::Index n_;
 };
 
+/// The unit in which a number may be meant that is too large in `unit`, and how large it is there.
+struct OtherUnit {
+  std::string_view unit, meant;
+  double size;
+};
+constexpr std::array<OtherUnit, 5> kOtherUnits = {{{"rad", "deg", std::numbers::pi / 180},
+                                                   {"rad/s", "deg/s", std::numbers::pi / 180},
+                                                   {"m", "mm", 1e-3},
+                                                   {"m/s", "mm/s", 1e-3},
+                                                   {"s", "ms", 1e-3}}};
+
+/// Refuses what is beyond the model's limits, or what no arm of its size needs.
+class ScaleCheck {
+ public:
+  explicit ScaleCheck(const RobotModel& model) : model_(model) {
+    double along = 0, around = 0;  // m/s, rad/s, if all joints were as fast as they may be
+    const double reach = reach_of(kdl_chain(model), model.joints());
+    for (const Joint& joint : model.joints()) {
+      const bool slides = joint.type == JointType::kPrismatic;
+      along += slides ? joint.velocity : reach * joint.velocity;
+      around += slides ? 0 : joint.velocity;
+    }
+    const char* fastest = "the fastest that the model's joints move the tip, ";
+    const char* span = "twice the arm's reach, ";
+    const char* times = "a reasonable time, ";
+    most_ = {{"limits.tip_velocity", along, fastest},
+             {"motion.linear_velocity", along, fastest},
+             {"motion.angular_velocity", around, fastest},
+             {"limits.linear_error", 2 * reach, span},
+             {"limits.angular_error", std::numbers::pi, "half a turn, "},
+             {"control.period", 0.1, times},
+             {"limits.stopping_time", 5, times},
+             {"motion.gain_time", 60, times},
+             {"integral.time", 60, times},
+             {"watchdog.longest_gap", 1, times},
+             {"watchdog.setpoint_hold", 60, times},
+             {"watchdog.setpoint_damp", 60, times},
+             {"watchdog.feedback", 10, times},
+             {"watchdog.release_after", 600, times}};
+  }
+
+  void operator()(const Setting& setting, double value) const {
+    for (const Most& most : most_) {
+      if (most.key == setting.key) check(most.key, value, most.value, setting.unit, most.what);
+    }
+  }
+  void operator()(const Setting& setting, const JointVector& values) const {
+    const std::string_view key = setting.key;
+    for (int i = 0; i < model_.dof(); ++i) {
+      const Joint& joint = model_.joints()[static_cast<std::size_t>(i)];
+      const std::string entry = std::string(key) + "[" + std::to_string(i) + "]";
+      const std::string unit =
+          joint.type == JointType::kPrismatic ? setting.prismatic : setting.unit;
+      const std::string what = "the model's limit of joint '" + joint.name + "', ";
+      if (key == "limits.torque" || key == "integral.torque") {
+        check(entry, values[i], joint.effort, unit, what);
+      } else if (key == "limits.velocity" || key == "motion.velocity") {
+        check(entry, values[i], joint.velocity, unit, what);
+      } else if (key == "limits.position_upper") {
+        check(entry, values[i], joint.upper, unit, what, kPositions);
+      } else if (key == "limits.position_lower") {
+        check(entry, -values[i], -joint.lower, unit, what, kPositions, -1);
+      }
+    }
+  }
+  template <class Other>
+  void operator()(const Setting& /*setting*/, const Other& /*value*/) const {}
+
+ private:
+  struct Most {
+    std::string_view key;
+    double value;
+    const char* what;
+  };
+  static constexpr double kPositions = 0.01;  // rad, m: limits are written with few digits
+  static constexpr double kShare = 1.01;      // likewise
+
+  static void check(std::string_view key, double value, double most, std::string_view unit,
+                    const std::string& what, double more = 0, int sign = 1) {
+    const bool stated = std::isfinite(most) && (more > 0 || most > 0);
+    if (!stated || value <= (more > 0 ? most + more : kShare * most)) return;
+    std::string text = "is " + number(sign * value) + " " + std::string(unit) + ", beyond " + what +
+                       number(sign * most) + " " + std::string(unit);
+    for (const OtherUnit& other : kOtherUnits) {
+      if (other.unit != unit || !(other.size * std::abs(value) <= 2 * std::abs(most))) {
+        continue;
+      }
+      text += "; is it in " + std::string(other.meant) + "? Write '" + number(sign * value) + " " +
+              std::string(other.meant) + "'";
+    }
+    throw InvalidSettings(std::string(key), text + "; limits.beyond_model: true accepts it");
+  }
+
+  const RobotModel& model_;
+  std::vector<Most> most_;
+};
+
 void need_at_most(const char* key, double value, double periods, double period) {
   if (value <= periods * period) return;
   fail(key, value, "s",
@@ -93,8 +196,19 @@ void check_initial(const Setpoint& initial, int n) {
 
 }  // namespace
 
-void validate(const Settings& settings, int n) {
+std::string doubtful_order(const RobotModel& model, const Matrix6& task_stiffness) {
+  const double move = task_stiffness.diagonal().head<3>().maxCoeff();
+  const double turn = task_stiffness.diagonal().tail<3>().maxCoeff();
+  const double lever = 2 * reach_of(kdl_chain(model), model.joints());
+  if (!(move > 0) || turn <= lever * lever * move) return "";
+  return "task stiffness: " + number(turn) + " N m/rad against rotation is much beside " +
+         number(move) + " N/m against translation, which stands first: is the order another?";
+}
+
+void validate(const Settings& settings, const RobotModel& model) {
+  const int n = model.dof();
   for_each_setting(settings, RangeCheck(n));
+  if (!settings.limits.beyond_model) for_each_setting(settings, ScaleCheck(model));
   need_at_most("motion.smoothing", settings.motion.smoothing, kMostSmoothing, settings.period);
   need_at_most("motion.gain_time", settings.motion.gain_time, 1e6, settings.period);
   const Limits& limits = settings.limits;

@@ -104,11 +104,11 @@ TEST(BrakeLag, HasToBeToldWhereItIsLong) {
   const RobotModel model = testing::chain_of({"revolute", "revolute"});
   Settings settings = default_settings(model);
   settings.analysis.sampled.cutoff = 5;
-  EXPECT_NO_THROW(validate(settings, 2));
+  EXPECT_NO_THROW(validate(settings, model));
   settings.analysis.sampled.cutoff = 1;
-  EXPECT_THROW(validate(settings, 2), InvalidSettings);
+  EXPECT_THROW(validate(settings, model), InvalidSettings);
   settings.limits.stopping_time = 1.6;
-  EXPECT_NO_THROW(validate(settings, 2));
+  EXPECT_NO_THROW(validate(settings, model));
 }
 
 /// (x' - x)' M^-1 (x' - x) -> min with |w + x'| <= torque and way M^-1 x' <= most, by Hildreth's

@@ -155,6 +155,7 @@ TEST_F(MovingArm, FreeDirectionsGiveWay) {
 
 TEST_F(MovingArm, PullsBackTheWayItCameBeyondHalfATurn) {
   Settings settings = arm.controller.settings();
+  settings.limits.beyond_model = true;
   settings.limits.angular_error = 10;
   arm = SimulatedArm(model, settings, testing::panda_ready());
   start(Mode::kCartesian);

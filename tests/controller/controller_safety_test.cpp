@@ -113,6 +113,7 @@ TEST_F(Safety, OutsideAPositionLimitReturnsWhateverLatchedFirst) {
 
 // Thrown about by somebody: too fast is no broken sensor, and an arm that falls is damped.
 TEST_F(Safety, AFastRobotIsDampedHoweverFast) {
+  settings.limits.beyond_model = true;
   settings.limits.tip_velocity = 100;
   settings.limits.velocity.setConstant(3);
   settings.limits.position_lower.setConstant(-100);
@@ -294,6 +295,7 @@ TEST_F(Safety, TooFastDampsUntilReleased) {
 
 TEST_F(Safety, ALawThatOverflowsDropsNothing) {
   settings.initial.gains.joint_damping.setIdentity(7, 7);
+  settings.limits.beyond_model = true;
   settings.limits.velocity.setConstant(1e308);
   settings.limits.tip_velocity = 1e308;
   make();

@@ -47,6 +47,7 @@ ModelOptions gears(int n, double stiffness, PositionSensor sensor, double dampin
 /// Settings without limits, and with a brake that these gears bear.
 Settings settings_of(const RobotModel& model, Mode mode) {
   Settings settings = testing::in_mode(testing::unlimited_settings(model), mode);
+  settings.limits.beyond_model = true;
   settings.limits.stopping_time = 1;
   settings.limits.position_upper.setConstant(kInfinite);
   settings.limits.position_lower.setConstant(-kInfinite);
@@ -254,6 +255,7 @@ TEST(ElasticJoints, AreStoppedByABrakeThatTheyBear) {
     const RobotModel motor = one_joint(options);
     Settings settings = default_settings(link);
     settings.period = 1e-6;  // no delay to speak of
+    settings.limits.beyond_model = true;
     settings.limits.stopping_time = 10;
     EXPECT_NEAR(gears_stopping_time(link, settings, 2 * T), T, 1e-4 * T) << D;
     EXPECT_DOUBLE_EQ(gears_stopping_time(link, settings, 100 * T), 20 * T) << D;

@@ -124,6 +124,7 @@ TEST_F(Recovery, RestsAnewAfterABadState) {
 /// The rest after one fault is none after the next.
 TEST_F(Recovery, RestsAnewAfterEachLawThatOverflows) {
   settings.watchdog.release_after = 0.3;
+  settings.limits.beyond_model = true;
   settings.limits.velocity.setConstant(1e308);
   settings.limits.tip_velocity = 1e308;
   make();

@@ -32,6 +32,7 @@ Setpoint good_setpoint(Mode mode) {
   setpoint.gains.joint_damping = JointMatrix::Identity(2, 2);
   setpoint.gains.task_stiffness.setIdentity();
   setpoint.gains.task_damping.setIdentity();
+  setpoint.tip_pose.position.setZero();
   setpoint.gains.null_stiffness = setpoint.gains.null_damping = JointVector::Ones(2);
   return setpoint;
 }
@@ -138,6 +139,7 @@ TEST(SetpointCheck, AsksForEverySizeAndLooksAtThePoseInItsModeAlone) {
       {tip, "", [](Setpoint& s) { s.gains.frame = Frame::kTool; }},
       {joint, "", [](Setpoint& s) { s.tip_pose.position[0] = kNoNumber; }},
       {tip, "tip_pose.position", [](Setpoint& s) { s.tip_pose.position[0] = kNoNumber; }},
+      {tip, "tip_pose.position", [](Setpoint& s) { s.tip_pose = Setpoint().tip_pose; }},
       {joint, "mode", [](Setpoint& s) { s.mode = static_cast<Mode>(2); }},
   };
   for (const auto& [mode, key, spoil] : cases) {

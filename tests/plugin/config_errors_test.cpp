@@ -10,6 +10,8 @@
 namespace dashpot::tests {
 namespace {
 
+using ::testing::HasSubstr;
+
 struct BadConfig {
   const char* said;  ///< all of it, after the file's name
   std::string text;  ///< after the first line, which describes the robot
@@ -113,7 +115,7 @@ const BadConfig kBadConfigs[] = {
      "  - [1, 0, 0, 0, 0, 0]\n  - [0.1, 1, 0, 0, 0, 0]\n" +
          kTaskRows},
     {"limits.position_lower[1]: is 2 rad, has to be below the upper limit (line 4)",
-     "limits:\n  torque: 10\n  position_lower: [-1, 2, -1, -2, -1, -1, -1]\n"},
+     "limits:\n  torque: 10\n  position_lower: [-1, 2, -1, -2, -1, 0, -1]\n"},
     {"limits.stopping_time: is 0 s, not positive (line 2)", "limits: {stopping_time: 0}\n"},
     {"limits.damping: is gone: limits.stopping_time replaces it (line 3)",
      "limits:\n  damping: 5\n"},
@@ -142,6 +144,61 @@ TEST(ConfigRefuses, WithTheLine) {
   }
 }
 
+/// What is in another unit, or off by a zero, would switch a protection off.
+TEST(ConfigRefuses, WhatIsBeyondTheModel) {
+  struct Beyond {
+    const char* settings;  ///< on line 2
+    const char* said;
+  };
+  for (const auto& [settings, said] : std::vector<Beyond>{
+           {"limits: {velocity: 150}",
+            "limits.velocity[0]: is 150 rad/s, beyond the model's limit of joint 'panda_joint1', "
+            "2.175 rad/s; is it in deg/s? Write '150 deg/s'"},
+           {"limits: {torque: 870}",
+            "limits.torque[0]: is 870 N m, beyond the model's limit of joint 'panda_joint1', "
+            "87 N m"},
+           {"limits: {position_lower: -10}",
+            "limits.position_lower[0]: is -10 rad, beyond the model's limit of joint "
+            "'panda_joint1', -2.8973 rad; is it in deg? Write '-10 deg'"},
+           {"limits: {position_upper: none}",
+            "limits.position_upper[0]: is inf rad, beyond the model's limit of joint "
+            "'panda_joint1', 2.8973 rad"},
+           {"limits: {angular_error: 60}",
+            "limits.angular_error: is 60 rad, beyond half a turn, 3.14159 rad; is it in deg? Write "
+            "'60 deg'"},
+           {"motion: {velocity: 30}",
+            "motion.velocity[0]: is 30 rad/s, beyond the model's limit of joint 'panda_joint1', "
+            "2.175 rad/s; is it in deg/s? Write '30 deg/s'"},
+           {"integral: {torque: 100}",
+            "integral.torque[0]: is 100 N m, beyond the model's limit of joint 'panda_joint1', "
+            "87 N m"},
+           {"limits: {stopping_time: 50}",
+            "limits.stopping_time: is 50 s, beyond a reasonable time, 5 s; is it in ms? Write "
+            "'50 ms'"},
+           {"watchdog: {longest_gap: 10}",
+            "watchdog.longest_gap: is 10 s, beyond a reasonable time, 1 s; is it in ms? Write "
+            "'10 ms'"}}) {
+    EXPECT_EQ(complaint(panda() + settings),
+              std::string(said) + "; limits.beyond_model: true accepts it (line 2)");
+    std::string accepted = settings;
+    if (accepted.starts_with("limits")) {
+      accepted.insert(accepted.size() - 1, ", beyond_model: true");
+    } else {
+      accepted += "\nlimits: {beyond_model: true}";
+    }
+    EXPECT_NO_THROW(load(panda() + accepted)) << accepted;
+  }
+  for (const char* key :
+       {"limits: {tip_velocity: 250", "limits: {linear_error: 300", "motion: {linear_velocity: 250",
+        "motion: {angular_velocity: 90", "watchdog: {setpoint_hold: 500",
+        "watchdog: {setpoint_damp: 2000", "watchdog: {feedback: 500",
+        "watchdog: {release_after: 2000", "integral: {time: 500", "motion: {gain_time: 500"}) {
+    EXPECT_THAT(complaint(panda() + key + "}"), HasSubstr("; is it in ")) << key;
+  }
+  EXPECT_NO_THROW(load(panda() + "limits: {velocity: 2.18, torque: 12, position_lower: [-2.9, -1, "
+                                 "-1, -2, -1, 0, -1]}"));
+}
+
 /// Returns what is wrong with the robot; `keys` follow urdf, base and tip.
 std::string complaint_about(const std::string& keys) {
   std::string text = panda();
@@ -167,6 +224,9 @@ TEST(ConfigRobot, HasKeysThatAreChecked) {
            {"robot.gravity: a list of 3 numbers is wanted, not '9.81' (line 2)", ", gravity: 9.81"},
            {"robot.tool.rpy: entry 3 has a wrong unit: '1 m'; rad is wanted (line 2)",
             ", tool: {rpy: [0, 0, 1 m]}"},
+           {"robot.tool.rpy: has an angle beyond a turn, in rad; degrees are written as '90 deg' "
+            "(line 2)",
+            ", tool: {rpy: [0, 90, 0]}"},
            {"robot.viscous_friction: is -1 N m s/rad, negative (line 2)", ", viscous_friction: -1"},
            {"robot.reflected_inertia: has a wrong unit: '3 kg'; kg m^2 is wanted (line 2)",
             ", reflected_inertia: 3 kg"},

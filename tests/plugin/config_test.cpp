@@ -125,7 +125,7 @@ TEST(Config, TakesTheRateForThePeriod) {
 }
 
 TEST(Config, FitsDefaultsToThePeriod) {
-  for (const char* period : {"1 us", "20 us", "0.1 ms", "0.5 ms", "1 ms", "20 ms", "1 s"}) {
+  for (const char* period : {"1 us", "20 us", "0.1 ms", "0.5 ms", "1 ms", "20 ms", "0.1 s"}) {
     SCOPED_TRACE(period);
     const Settings settings = load(panda() + "control: {period: " + period + "}\n").settings;
     EXPECT_EQ(settings.motion.smoothing, std::min(0.03, 256 * settings.period));
@@ -228,7 +228,8 @@ TEST(Config, FillsLimits) {
   const auto limits = load(panda() +
                            "limits:\n  position_lower: [-90 deg, none, -1, -2, -1, 0, none]\n"
                            "  position_upper: none\n  torque: 10\n"
-                           "  torque_rate: [1, 2, 3, 4, 5, 6, 7]\n  velocity: 30 rpm\n")
+                           "  torque_rate: [1, 2, 3, 4, 5, 6, 7]\n  velocity: 30 rpm\n"
+                           "  beyond_model: true\n")
                           .settings.limits;
   EXPECT_DOUBLE_EQ(limits.position_lower[0], -90 * kDegree);
   EXPECT_EQ(limits.position_lower[1], -kInfinity);

@@ -218,8 +218,10 @@ TEST(PluginPayload, ThatIsTooHeavyHereIsTakenIfItIsLighterThanWhatIsCarried) {
       carrying_host("mass: 8, center: [0, 0, 0.05], inertia: [0.008, 0.008, 0.008]", kGains);
   dashpot_controller* const arm = host.controller.get();
   ASSERT_NE(arm, nullptr) << plugin().last_error();
-  const std::vector<double> stretched{0, 1.5, 0, -0.3, 0, 1.8, 0};
-  ASSERT_EQ(plugin().start(arm, stretched.data(), nullptr), DASHPOT_OK) << plugin().last_error();
+  host.position = {0, 1.5, 0, -0.3, 0, 1.8, 0};  // stretched
+  EXPECT_EQ(plugin().start(arm, host.position.data(), nullptr), DASHPOT_WRONG_VALUE);
+  EXPECT_THAT(plugin().last_error(), HasSubstr("'panda_joint2' needs 118.72 N m to hold the arm"));
+  host.tick();
   const dashpot_payload heavier = payload(9), lighter = payload(7);
   EXPECT_EQ(plugin().set_payload(arm, &heavier), DASHPOT_WRONG_VALUE);
   EXPECT_EQ(plugin().set_payload(arm, &lighter), DASHPOT_OK) << plugin().last_error();

@@ -112,6 +112,7 @@ TEST_P(ActingModes, AreThoseOfTheSimulatedMotion) {
       release_settings(twin, tip_gains(twin, q0, omega, zeta, 0.3, random), kPeriod);
   settings.initial.mode = param.mode;
   settings.watchdog.feedback = 0;
+  settings.limits.beyond_model = true;
   settings.limits.torque.setConstant(1e4);
   settings.limits.torque_rate.setConstant(1e6);
   const MatrixXd M = robot.M, L = M.llt().matrixL();

@@ -208,6 +208,7 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
     settings.initial.mode = param.mode;
     settings.task_terms.load = param.load;
     settings.watchdog.feedback = 0;  // it stands still to the last bit
+    settings.limits.beyond_model = true;
     settings.limits.torque.setConstant(1e4);
     settings.limits.torque_rate.setConstant(1e6);
     settings.motion.linear_velocity = settings.motion.angular_velocity = 1;
@@ -312,6 +313,7 @@ TEST_P(LoadedPostures, HaveTheModesOfTheSimulatedMotion) {
     controller::Settings settings = release_settings(twin, gains, 2.5e-4);
     settings.task_terms.load = Load::kBaseWrench;
     settings.watchdog.feedback = 0;
+    settings.limits.beyond_model = true;
     settings.limits.torque.setConstant(1e4);
     settings.limits.torque_rate.setConstant(1e6);
     settings.limits.gain_margin = 1;

@@ -234,6 +234,7 @@ struct Stop {
 Stop stop_of(const Gears& gears, double stopping_time) {
   const int kTicks = stopping_time < 0.1 ? 2500 : 6000;
   controller::Settings settings = controller::default_settings(gears.model);
+  settings.limits.beyond_model = true;
   settings.limits.stopping_time = stopping_time;
   settings.analysis.where = controller::Analysis::Where::kOff;
   const controller::Limits& limits = settings.limits;

@@ -129,6 +129,7 @@ struct LedPair {
  private:
   /// No limit or watchdog interferes.
   static Settings quiet(Settings settings) {
+    settings.limits.beyond_model = true;
     settings.limits.velocity.setConstant(1e3);
     settings.limits.tip_velocity = 1e3;
     settings.watchdog.feedback = 0;

@@ -133,6 +133,7 @@ class DrawnElasticLoop {
     settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
     settings.watchdog.feedback = 0;
     settings.analysis.share = 1;
+    settings.limits.beyond_model = true;
     settings.limits.torque.setConstant(1e4);
     settings.limits.torque_rate.setConstant(1e6);
     settings.limits.gain_margin = 1;

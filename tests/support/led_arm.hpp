@@ -29,6 +29,7 @@ inline controller::Settings unlimited_settings(const controller::RobotModel& mod
   settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
   settings.watchdog.feedback = 0;
   settings.analysis.share = 1;
+  settings.limits.beyond_model = true;
   settings.limits.velocity.setConstant(1e3);
   settings.limits.tip_velocity = 1e3;
   settings.limits.position_lower.setConstant(-10);
