@@ -165,8 +165,10 @@ class PlainWriter {
         write_attribute(name, value);
       }
     }
+    const bool limit = tag.depth == 2 && tag.name == "limit";
+    if (limit) complete(tag);
     text.append(tag.ends ? "/>" : ">");
-    if (tag.depth == 2 && tag.name == "limit") read_limits(tag);
+    if (limit) read_limits(tag);
   }
 
   void write_attribute(std::string_view name, std::string_view value) {
@@ -187,6 +189,16 @@ class PlainWriter {
     if (!(std::abs(norm - 1) < 1e-2)) fail("quat_xyzw: is not of length 1");  // or in another unit
     for (double& entry : q) entry /= norm;
     return rpy_of(q);
+  }
+
+  /// Writes what a limit lacks: of a joint that nobody asks for it does not matter.
+  void complete(const XmlTag& tag) {
+    for (const char* name : {"effort", "velocity"}) {
+      if (has(tag, name)) continue;
+      write_attribute(name, "0");
+      std::string& lacks = result_.lacks[part_name_];
+      lacks += (lacks.empty() ? "" : " and ") + std::string(name);
+    }
   }
 
   void read_limits(const XmlTag& tag) {

@@ -19,6 +19,9 @@ struct PlainUrdf {
   std::string text;
   std::map<std::string, MotionLimits, std::less<>>
       limits;  ///< by joint; only those that are stated
+  /// By joint, what its limit lacks though URDF asks for it: "effort", "velocity" or both, which
+  /// are 0 in `text`.
+  std::map<std::string, std::string, std::less<>> lacks;
 };
 
 /// Checks a URDF of version 1.0, 1.1 or 1.2 as check_xml does, and returns it in version 1.0 with

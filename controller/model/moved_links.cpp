@@ -12,7 +12,8 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kNegligible = 1e-6;  // share of the chain
+/// Share of the chain's moments of inertia that cannot matter: half of it is in frequencies.
+constexpr double kNegligible = 1e-4;
 constexpr std::size_t kShownLinks = 10;
 
 std::string figure(double value) {
@@ -38,19 +39,6 @@ const MovedLink* heaviest(const std::vector<MovedLink>& links, int first_joint, 
     if (!found || link.body.body.getMass() > found->body.body.getMass()) found = &link;
   }
   return found;
-}
-
-/// Far out, as the distances of joints and centres of mass add up, m.
-double reach_of(const RobotModel& model) {
-  double reach = 0;
-  for (const KDL::Segment& segment : kdl_chain(model).segments) {
-    reach += segment.getFrameToTip().p.Norm() + segment.getInertia().getCOG().Norm();
-  }
-  for (const Joint& joint : model.joints()) {
-    const double range = joint.upper - joint.lower;
-    if (joint.type == JointType::kPrismatic && std::isfinite(range)) reach += range;
-  }
-  return reach;
 }
 
 /// Largest torque of the weight at some postures within the limits.
@@ -95,9 +83,9 @@ void doubt_masses(const RobotModel& model, const std::vector<MovedLink>& links,
   }
 }
 
-void doubt_inertias(const RobotModel& model, const std::vector<MovedLink>& links,
+void doubt_inertias(const RobotModel& model, const std::vector<MovedLink>& links, double reach,
                     std::vector<std::string>& warnings) {
-  const double reach = reach_of(model), most = std::max(3 * reach, 3.0);
+  const double most = std::max(3 * reach, 3.0);
   double moments = 0;
   for (const KDL::Segment& segment : kdl_chain(model).segments) {
     moments += half_trace(segment.getInertia());
@@ -110,6 +98,85 @@ void doubt_inertias(const RobotModel& model, const std::vector<MovedLink>& links
                                 figure(mass) +
                                 " kg, is that of a body larger than the arm, whose " +
                                 "links add up to " + figure(reach) + " m: is it in kg m^2?"));
+  }
+}
+
+/// Returns the middle one of the sizes that the links' masses and inertias have, m; 0 of fewer than
+/// three links.
+double middle_size(const std::vector<MovedLink>& links) {
+  std::vector<double> sizes;
+  for (const MovedLink& link : links) {
+    const double mass = link.body.body.getMass();
+    if (mass > 0) sizes.push_back(std::sqrt(link.body.moment / mass));
+  }
+  if (sizes.size() < 3) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle;
+}
+
+/// What is attached to the tip, and the inertias as a whole, beside the reach of the arm, m.
+void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, double reach,
+                 std::vector<std::string>& warnings) {
+  constexpr double kArm = 0.5;     // m: a smaller arm may carry things as large as this
+  constexpr double kMiddle = 0.5;  // of the reach; links have a tenth of it
+  const std::string beside = " m, the arm reaches " + figure(reach) + " m: ";
+  const auto doubt = [&](const std::string& what, double size, const char* question) {
+    if (size > std::max(reach, kArm)) warnings.push_back(what + figure(size) + beside + question);
+  };
+  const Attachment& attached = model.attachment();
+  const Payload payload = attached.payload();
+  doubt("tool: its frame is off the tip link by ", attached.tool.position.norm(),
+        "is tool.position in m?");
+  doubt("payload: its centre is off the tip link by ", payload.center.norm(),
+        "is payload.center in m?");
+  if (payload.mass > 0) {
+    doubt("payload: its mass and inertia are those of a body of ",
+          std::sqrt(0.5 * payload.inertia.trace() / payload.mass), "is its inertia in kg m^2?");
+  }
+  if (const double size = middle_size(links); size > kMiddle * reach) {
+    warnings.push_back("links: their masses and inertias are those of bodies of " + figure(size) +
+                       beside + "are inertias in kg m^2?");
+  }
+}
+
+/// Rotors heavier than the arm, and limits of joints that are hardly in rad.
+void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, double reach,
+                  std::vector<std::string>& warnings) {
+  constexpr double kTurn = 30;      // rad: five turns, as cables allow
+  constexpr double kSpeed = 50;     // rad/s
+  constexpr double kNoLimit = 1e4;  // rad, rad/s: written where there is none
+  double mass = model.attachment().mass;
+  for (const MovedLink& link : links) mass += link.body.body.getMass();
+  const auto doubtful = [](double limit, double most) { return limit > most && limit < kNoLimit; };
+  for (const Joint& joint : model.joints()) {
+    if (joint.type == JointType::kPrismatic) continue;
+    const std::string name = "joint '" + joint.name + "': ";
+    if (mass > 0 && joint.reflected_inertia > mass * std::max(1.0, reach * reach)) {
+      warnings.push_back(one_line(
+          name + "its reflected inertia, " + figure(joint.reflected_inertia) +
+          " kg m^2, is more than that of the whole arm, " + figure(mass) + " kg, at its reach, " +
+          figure(reach) + " m: is it in kg m^2, and seen by the joint?"));
+    }
+    if (doubtful(std::max(-joint.lower, joint.upper), kTurn)) {
+      warnings.push_back(one_line(name + "its limits of position, " + figure(joint.lower) + " to " +
+                                  figure(joint.upper) + " rad, are many turns: are they in deg?"));
+    }
+    if (doubtful(joint.velocity, kSpeed)) {
+      warnings.push_back(one_line(name + "its limit of velocity, " + figure(joint.velocity) +
+                                  " rad/s, is hardly one of an arm: is it in deg/s?"));
+    }
+  }
+}
+
+/// Joints that move no mass before the next one does.
+void doubt_massless(const RobotModel& model, std::vector<std::string>& warnings) {
+  for (int i = 0; i < model.dof(); ++i) {
+    const KDL::Segment& segment = kdl_chain(model).getSegment(static_cast<unsigned>(i));
+    if (segment.getInertia().getMass() > 0) continue;
+    const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    warnings.push_back(one_line(quoted(segment.getName()) + ", which joint '" + joint.name +
+                                "' moves, has no mass: is its inertial missing?"));
   }
 }
 
@@ -144,12 +211,23 @@ void doubt_weight(const RobotModel& model, const std::vector<MovedLink>& links,
 
 }  // namespace
 
+double reach_of(const KDL::Chain& chain, const std::vector<Joint>& joints) {
+  double reach = 0;
+  for (const KDL::Segment& segment : chain.segments) {
+    reach += segment.getFrameToTip().p.Norm() + segment.getInertia().getCOG().Norm();
+  }
+  for (const Joint& joint : joints) {
+    const double range = joint.upper - joint.lower;
+    if (joint.type == JointType::kPrismatic && std::isfinite(range)) reach += range;
+  }
+  return reach;
+}
+
 void check_links(const std::vector<MovedLink>& links, const ModelOptions& options,
                  const KDL::Chain& chain, const std::string& name,
                  std::vector<std::string>& warnings) {
-  double mass = 0, moments = 0;  // of the chain
+  double moments = 0;  // of the chain
   for (const KDL::Segment& segment : chain.segments) {
-    mass += segment.getInertia().getMass();
     moments += half_trace(segment.getInertia());
   }
   std::string text;
@@ -161,10 +239,10 @@ void check_links(const std::vector<MovedLink>& links, const ModelOptions& option
                          std::find(names.begin(), names.end(), own.link) != names.end())) {
       continue;
     }
-    if (own.possible && own.body.getMass() < kNegligible * mass &&
-        own.moment < kNegligible * moments) {
-      warnings.push_back(one_line(quoted(own.link) + ": " + own.problem +
-                                  "; its share of the arm is below 1e-6, and cannot matter"));
+    if (own.possible && own.moment < kNegligible * moments) {
+      warnings.push_back(one_line(quoted(own.link) + ": " + own.problem + "; it is " +
+                                  figure(own.moment / moments) +
+                                  " of the arm's inertia, and cannot matter"));
       continue;
     }
     if (own.possible) ++acceptable;
@@ -182,9 +260,22 @@ void check_links(const std::vector<MovedLink>& links, const ModelOptions& option
 }
 
 void doubt_units(const RobotModel& model, const std::vector<MovedLink>& links,
-                 std::vector<std::string>& warnings) {
+                 const KDL::Chain& bare, std::vector<std::string>& warnings) {
+  constexpr double kLongArm = 50;  // m
+  constexpr double kGravity = 30;  // m/s^2, more than on any planet that one stands on
+  const double reach = reach_of(bare, model.joints());
+  if (reach > kLongArm) {
+    warnings.push_back("links: they add up to " + figure(reach) + " m: are lengths in mm?");
+    return;
+  }
+  if (const double gravity = model.gravity().norm(); gravity > kGravity) {
+    warnings.push_back("gravity: " + figure(gravity) + " m/s^2 is more than on any planet");
+  }
+  doubt_massless(model, warnings);
+  doubt_joints(model, links, reach, warnings);
+  doubt_sizes(model, links, reach, warnings);
   doubt_masses(model, links, warnings);
-  doubt_inertias(model, links, warnings);
+  doubt_inertias(model, links, reach, warnings);
   doubt_weight(model, links, warnings);
 }
 

@@ -18,16 +18,21 @@ struct MovedLink {
 };
 
 /// Throws InvalidModel, which begins with `name` and names every link whose inertia no body can
-/// have, unless the options accept it. A link whose mass and inertia are less than 1e-6 of the
-/// chain's cannot matter: it gets a warning instead.
+/// have, unless the options accept it. A link whose inertia is less than 1e-4 of the chain's cannot
+/// matter: it gets a warning instead.
 void check_links(const std::vector<MovedLink>& links, const ModelOptions& options,
                  const KDL::Chain& chain, const std::string& name,
                  std::vector<std::string>& warnings);
 
-/// Adds a warning for each figure whose unit is hardly the one of URDFs: a link much heavier or
-/// lighter than those of the other joints, an inertia of a body much larger than the arm, and a
-/// weight ten times what a joint can hold.
+/// How far out the arm reaches at most, as the distances of its joints and centres of mass add up,
+/// m.
+double reach_of(const KDL::Chain& chain, const std::vector<Joint>& joints);
+
+/// Adds a warning for each figure whose unit is hardly the one of URDFs: a link without mass, or
+/// much heavier or lighter than those of the other joints, inertias of bodies much larger than the
+/// arm, rotors heavier than it, limits of many turns, a tool or payload beyond its reach, and a
+/// weight ten times what a joint can hold. `bare` is the chain with nothing attached.
 void doubt_units(const RobotModel& model, const std::vector<MovedLink>& links,
-                 std::vector<std::string>& warnings);
+                 const KDL::Chain& bare, std::vector<std::string>& warnings);
 
 }  // namespace dashpot::controller

@@ -200,6 +200,9 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
   std::vector<Joint> joints;
   for (const urdf::JointConstSharedPtr& joint : path) {
     if (joint->type == urdf::Joint::FIXED) continue;
+    if (const auto lacks = tree.lacks.find(joint->name); lacks != tree.lacks.end()) {
+      refuse(name, "joint", joint->name, "its limit has no " + lacks->second);
+    }
     try {
       joints.push_back(read_joint(*joint));
     } catch (const std::invalid_argument& error) {
@@ -376,6 +379,7 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
   check_links(moved, options, data->chain, name, data->warnings);
   doubt_base(*tree, base, path, data->warnings);
   doubt_limits(path, data->warnings);
+  const KDL::Chain bare = data->chain;
   data->attach(attachment);
   data->joints = std::move(joints);
   data->position_sensor = options.position_sensor;
@@ -383,7 +387,7 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
   data->gravity = {g.x(), g.y(), g.z()};
   RobotModel model(data);
   check_inertia(model, name);
-  doubt_units(model, moved, data->warnings);
+  doubt_units(model, moved, bare, data->warnings);
   return model;
 }
 

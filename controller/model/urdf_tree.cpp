@@ -61,6 +61,7 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
     text::PlainUrdf plain = text::plain_urdf(text, name);
     model = urdf::parseURDF(plain.text);
     tree.limits = std::move(plain.limits);
+    tree.lacks = std::move(plain.lacks);
   } catch (const std::exception& error) {
     throw InvalidModel(one_line(name + ": " + error.what()));
   }
