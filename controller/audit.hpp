@@ -17,9 +17,10 @@ namespace dashpot::controller {
 /// Without a period no gain margin is computed, and in it alone an integral counts.
 struct AuditOptions : LoopTiming {
   Mode mode = Mode::kCartesian;  ///< which of the gains act
-  /// Stiffness and damping as stated. The ratios and `directions` in it are not read: a direction
-  /// of the task without stiffness and damping is free. Joint matrices and null-space vectors
-  /// without entries count as zero.
+  /// Stiffness and damping as stated. `directions` in it are not read: a direction of the task
+  /// without stiffness and damping is free. Joint matrices and null-space vectors without entries
+  /// count as zero. With a ratio the damping is designed at each posture as Controller does, as
+  /// much as the loop leaves of it with `margin`.
   Gains gains;
   /// True if the controller takes the vector part of the error's quaternion, which is half of the
   /// rotation vector, for its rotational error. The springs then act with half of the stated
@@ -129,7 +130,8 @@ class Audit {
  public:
   /// Throws std::invalid_argument, with the member's name and the reason, for gains and ranges of
   /// another size, or gains that are not finite or not symmetric, for stiffness that is not
-  /// positive semidefinite, and for a loop that analysis::gain_margin refuses.
+  /// positive semidefinite, for a ratio in a law that Controller does not have, and for a loop that
+  /// analysis::gain_margin refuses.
   Audit(const RobotModel& model, const AuditOptions& options);
 
   const RobotModel& model() const noexcept { return model_; }
@@ -163,8 +165,8 @@ class Audit {
   std::vector<PostureNumbers> sample(std::uint64_t seed, std::int64_t first,
                                      std::int64_t count) const;
 
-  /// Returns the springs and dampers at q as matrices, as if no gear gave way. Throws like
-  /// numbers().
+  /// Returns the springs and dampers at q as matrices, as if no gear gave way, without those
+  /// designed for a ratio. Throws like numbers().
   analysis::TaskImpedance impedance(const JointVector& q) const {
     return task_impedance(evaluate(q));
   }
@@ -185,6 +187,8 @@ class Audit {
 
  private:
   DynamicsResult evaluate(const JointVector& q) const;
+  /// Returns the closed loop at q and, with a period, how it is sampled.
+  LoopAt at(const JointVector& q) const;
   std::optional<PostureNumbers> numbers(
       const analysis::System<kMaxJoints>& system,
       const std::function<analysis::SampledLoop()>& sampled) const;
@@ -200,8 +204,9 @@ class Audit {
   RobotModel model_;
   AuditOptions options_;
   SampledArm arm_;
-  Impedance impedance_;  ///< in 1/s^2 and 1/s with inertia_blocks
-  int springs_ = 0;      ///< modes where no posture is singular
+  Impedance impedance_;               ///< in 1/s^2 and 1/s with inertia_blocks
+  int springs_ = 0;                   ///< modes where no posture is singular
+  std::optional<Settings> designed_;  ///< of the controller that designs damping for ratios
 };
 
 /// Summarizes postures by their `numbers`; posture(i) returns the i-th posture. The numbers in the

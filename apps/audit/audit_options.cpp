@@ -52,13 +52,7 @@ void read_gains_file(const std::string& path, const RobotModel& model, AuditOpti
   const controller::YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
   const controller::YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("gains")) throw InputError("gains", "missing");
-  const controller::Gains& gains = audit.gains = controller::read_gains(root, model);
-  if (gains.joint_damping_ratio > 0 || gains.task_damping_ratio > 0 ||
-      gains.null_damping_ratio > 0) {
-    throw InputError("gains",
-                     "damping_ratio asks for damping that follows the posture; an audit "
-                     "needs damping");
-  }
+  audit.gains = controller::read_gains(root, model);
 } catch (const InputError& error) {
   throw error.in_file(path);
 }
@@ -125,8 +119,12 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
     audit.kinematic_null_space = command.null_projector == "kinematic";
   }
   if (command.frame == "tool") audit.gains.frame = controller::Frame::kTool;
-  if (!factor) return;
   controller::Gains& gains = audit.gains;
+  const double ratio =
+      audit.mode == Mode::kJoint ? gains.joint_damping_ratio : gains.task_damping_ratio;
+  if (ratio > 0) intended_ratio = ratio;
+  if (!factor) return;
+  gains.task_damping_ratio = gains.joint_damping_ratio = 0;
   intended_ratio = *factor / 2;
   gains.task_damping = factor_damping("--damping-factor", *factor, gains.task_stiffness);
   gains.joint_damping = factor_damping("--damping-factor", *factor, gains.joint_stiffness);
@@ -143,7 +141,10 @@ void check(const AuditCommand& command) {
   }
   const auto need_damping = [&](const std::string& option, const std::string& damping) {
     if (damping.empty() && !command.damping_factor) {
-      throw InputError(option, "missing; give it, or --damping-factor");
+      throw InputError(option, std::string("missing; give it, or --damping-factor") +
+                                   (command.damping_ratio
+                                        ? "; dashpot design finds the damping for a --damping-ratio"
+                                        : ""));
     }
     if (!damping.empty() && command.damping_factor) {
       throw InputError(option, "does not go with --damping-factor, which says the same");
@@ -184,6 +185,7 @@ AuditTask read_task(const AuditCommand& command) {
   task.drives = arm.drives;
   AuditOptions& audit = task.options;
   read_gains(command, task.model, audit, task.intended_ratio);
+  if (!audit.inertia_blocks) warn_of(task.model, audit.gains.task_stiffness);
   static_cast<controller::LoopTiming&>(audit) = command.timing;
   if (command.no_margin) audit.period = 0;
   audit.margin = command.margin;

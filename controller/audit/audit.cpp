@@ -3,6 +3,7 @@
 #include <dashpot/analysis/null_damping.hpp>
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/audit/stated_gains.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
@@ -14,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace dashpot::controller {
 namespace {
@@ -141,6 +143,39 @@ PostureNumbers numbers_of(const analysis::Spectrum<>& spectrum) {
   return result.numbers;
 }
 
+/// The settings of a controller that designs damping for the ratios of `options`; none without one.
+std::optional<Settings> designed(const RobotModel& model, const AuditOptions& options) {
+  const Gains& gains = options.gains;
+  const bool any = options.mode == Mode::kJoint
+                       ? gains.joint_damping_ratio > 0
+                       : gains.task_damping_ratio > 0 || gains.null_damping_ratio > 0;
+  if (!any) return std::nullopt;
+  require(!options.kinematic_null_space && !options.inertia_blocks && !options.half_quaternion,
+          "damping_ratio: only Dashpot's own law designs damping, with the dynamically consistent "
+          "projector, rotation vectors and gains that are not multiplied by inertia");
+  Settings settings = default_settings(model);
+  if (options.period > 0) settings.period = options.period;
+  settings.limits.gain_margin = options.period > 0 ? options.margin : 1;
+  settings.analysis.sampled.delay = options.delay;
+  settings.analysis.sampled.cutoff = options.cutoff;
+  settings.analysis.sampled.difference_velocity = options.difference_velocity;
+  settings.integral.time = options.integral_time;
+  settings.feed_forward.gravity = !options.ideal_gravity;
+  Gains& wanted = settings.initial.gains;
+  if (options.mode == Mode::kJoint) {
+    const JointMatrix none = JointMatrix::Zero(model.dof(), model.dof());
+    wanted.joint_stiffness = gains.joint_stiffness;
+    wanted.joint_damping = gains.joint_damping.size() > 0 ? gains.joint_damping : none;
+    wanted.joint_damping_ratio = gains.joint_damping_ratio;
+  } else {
+    const auto [stiffness, damping] = std::pair(wanted.joint_stiffness, wanted.joint_damping);
+    wanted = gains;
+    wanted.joint_stiffness = stiffness;
+    wanted.joint_damping = damping;
+  }
+  return settings;
+}
+
 Audit::Audit(const RobotModel& model, const AuditOptions& options)
     : model_(model),
       options_(options),
@@ -174,6 +209,7 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
   require(options_.lower.size() == n && options_.upper.size() == n &&
               (options_.lower.array() <= options_.upper.array()).all(),
           "lower, upper: need n entries, none of lower above that of upper");
+  designed_ = designed(model, options);
 }
 
 DynamicsResult Audit::evaluate(const JointVector& q) const {
@@ -209,6 +245,10 @@ analysis::SampledLoop Audit::loop(const JointVector& q, const DynamicsResult& ro
 }
 
 PostureNumbers Audit::numbers(const JointVector& q) const {
+  if (designed_) {
+    const std::optional<PostureNumbers> quick = numbers(at(q));
+    return quick ? *quick : audit(q).numbers;
+  }
   const DynamicsResult robot = evaluate(q);
   Impedance impedance = impedance_at(robot);
   NullSpace null_space;
@@ -305,9 +345,17 @@ analysis::System<> Audit::system_of(const analysis::TaskImpedance& impedance) co
   return system;
 }
 
-PostureAudit Audit::audit(const JointVector& q) const {
+LoopAt Audit::at(const JointVector& q) const {
   const DynamicsResult robot = evaluate(q);
-  const analysis::System<> system = system_of(task_impedance(robot));
+  if (designed_) {
+    return PostureLoop(model_, *designed_).at(q, designed_->initial.gains, options_.mode);
+  }
+  return {system_of(task_impedance(robot)),
+          options_.period > 0 ? with_gears(loop(q, robot)) : analysis::SampledLoop()};
+}
+
+PostureAudit Audit::audit(const JointVector& q) const {
+  const auto [system, loop] = at(q);
   PostureAudit result;
   result.q = q;
   analysis::SpectrumOptions options;
@@ -316,7 +364,6 @@ PostureAudit Audit::audit(const JointVector& q) const {
   read_spectrum(result.spectrum, result);
   result.numbers.singular = result.numbers.zero_modes > model_.dof() - springs_;
   if (options_.period == 0) return result;
-  const analysis::SampledLoop loop = with_gears(this->loop(q, robot));
   result.numbers.gain_margin = analysis::gain_margin(system, result.spectrum, loop);
   if (options_.integral_time > 0) {
     result.integral_decays =
@@ -332,7 +379,7 @@ MissingRotors Audit::missing_rotors(const PostureAudit& found) const {
   if (options_.period > 0 && found.numbers.gain_margin >= options_.margin) {
     missing.inertia = JointVector::Zero(model_.dof());
   } else if (options_.period > 0) {
-    const analysis::System<> system = system_of(task_impedance(evaluate(found.q)));
+    const analysis::System<> system = at(found.q).system;
     missing.inertia = enough_reflected_inertia(
         model_, system, options_.period, [&](const RobotModel& with_rotors) {
           return Audit(with_rotors, options_).numbers(found.q).gain_margin >= options_.margin;
