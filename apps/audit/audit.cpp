@@ -4,14 +4,11 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/report/text_table.hpp>
-#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/posture.hpp>
 
 #include <CLI/CLI.hpp>
-#include <Eigen/SVD>
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -110,34 +107,10 @@ void write_csv(OutputFile& file, const Postures& postures,
   file.finish();
 }
 
-/// The directions of the task in which the arm hardly moves at q, each as its largest parts: "z",
-/// "y + 0.40 rx".
-std::string lost_directions(const controller::RobotModel& model, const JointVector& q) {
-  constexpr std::array<const char*, 6> kNames = {"x", "y", "z", "rx", "ry", "rz"};
-  const controller::DynamicsResult robot =
-      controller::evaluate(model, q, JointVector::Zero(model.dof()));
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(Eigen::MatrixXd(robot.J), Eigen::ComputeFullU);
-  std::string text;
-  for (Eigen::Index k = 0; k < svd.singularValues().size(); ++k) {
-    if (svd.singularValues()[k] > 0.02 * svd.singularValues()[0]) continue;
-    Eigen::VectorXd u = svd.matrixU().col(k);
-    Eigen::Index largest = 0;
-    u.cwiseAbs().maxCoeff(&largest);
-    u /= u[largest];
-    text += (text.empty() ? "" : ", ") + std::string(kNames[static_cast<std::size_t>(largest)]);
-    for (Eigen::Index i = 0; i < 6; ++i) {
-      if (i == largest || std::abs(u[i]) < 0.05) continue;
-      text += (u[i] < 0 ? " - " : " + ") + format_number(std::abs(u[i]), 2) + " " +
-              kNames[static_cast<std::size_t>(i)];
-    }
-  }
-  return text;
-}
-
 void suggest(const Audit& audit, const AuditTask& task, AuditReport& report) {
   if (report.posture.numbers.singular) {
     const std::string directions = task.options.mode == controller::Mode::kCartesian
-                                       ? lost_directions(task.model, task.q)
+                                       ? controller::lost_directions(task.model, task.q)
                                        : "";
     report.lost_directions = directions.empty() ? "some" : directions;
     report.no_suggestion =

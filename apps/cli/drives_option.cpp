@@ -4,6 +4,7 @@
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/input_error.hpp>
+#include <dashpot/controller/settings_check.hpp>
 
 #include <limits>
 #include <sstream>
@@ -37,6 +38,11 @@ void warn_of(const controller::RobotModel& model) {
   for (const std::string& warning : model.warnings()) {
     print_error("warning: " + warning);
   }
+}
+
+void warn_of(const controller::RobotModel& model, const controller::Matrix6& task_stiffness) {
+  const std::string doubt = controller::doubtful_order(model, task_stiffness);
+  if (!doubt.empty()) print_error("warning: " + doubt);
 }
 
 void add_gear_options(CLI::App& command, GearOptions& options) {

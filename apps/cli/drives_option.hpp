@@ -22,6 +22,9 @@ void take_accepted(const std::string& accepted, controller::ModelOptions& model)
 
 /// Tells people at the terminal what is doubtful about the description of the arm.
 void warn_of(const controller::RobotModel& model);
+/// The same of the stiffness of its task.
+void warn_of(const controller::RobotModel& model, const controller::Matrix6& task_stiffness);
+
 /// What is told of gears that bend; lists of quantities between commas, or one for all joints.
 struct GearOptions {
   std::string stiffness;        ///< N m/rad; "none": rigid

@@ -15,15 +15,19 @@ using controller::RobotModel;
 
 void PostureOption::add(CLI::App& command) {
   command.add_option("--q", q, "Joint positions, rad or m")
-      ->option_text("a,b,... (middle of the limits)");
+      ->option_text("a,b,... (middle of the limits; if singular, beside it)");
   command.add_flag("--outside-limits", outside_limits,
                    "Take joint positions outside the limits, with a warning");
 }
 
 JointVector PostureOption::read(const RobotModel& model) const {
-  if (q.empty()) return controller::middle_posture(model);
-  JointVector posture = parse_quantities("--q", q, controller::joint_units(model, "rad", "m"));
-  check("--q", model, posture);
+  JointVector posture = controller::default_posture(model);
+  if (!q.empty()) {
+    posture = parse_quantities("--q", q, controller::joint_units(model, "rad", "m"));
+    check("--q", model, posture);
+  }
+  const std::string heavy = controller::too_heavy(model, posture);
+  if (!heavy.empty()) print_error("warning: --q: " + heavy);
   return posture;
 }
 

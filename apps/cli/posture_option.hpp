@@ -11,7 +11,7 @@ namespace dashpot::apps {
 
 /// What the user says of a posture.
 struct PostureOption {
-  std::string q;                ///< empty: controller::middle_posture
+  std::string q;                ///< empty: controller::default_posture
   bool outside_limits = false;  ///< take what is outside the position limits, with a warning
   double refused = 1e-3;        ///< rad or m outside them, from where on it is refused otherwise
 

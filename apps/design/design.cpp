@@ -8,6 +8,7 @@
 #include <dashpot/apps/design/design_report.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/rotors.hpp>
 
 #include <CLI/CLI.hpp>
@@ -262,6 +263,17 @@ std::vector<JointVector> region_postures(const DesignOptions& options,
   return postures;
 }
 
+/// Where the tip's springs lose a direction, the damping for them is of no use anywhere else.
+void refuse_singular(const DesignOptions& options, const controller::RobotModel& model,
+                     const JointVector& q) {
+  if (options.region || options.arm.task_stiffness.empty()) return;
+  const std::string lost = controller::lost_directions(model, q);
+  if (lost.empty()) return;
+  throw InputError("--q", "the posture is singular: no spring acts in direction " + lost +
+                              ", and damping that is designed here fits no posture beside it; take "
+                              "another --q, or many (--region)");
+}
+
 void run_design(const DesignOptions& options, OutputFile& csv) try {
   SystemFile file;
   std::optional<controller::RobotModel> model;
@@ -271,11 +283,15 @@ void run_design(const DesignOptions& options, OutputFile& csv) try {
   } else {
     model = read_model(options.arm);
     postures = region_postures(options, *model);
+    refuse_singular(options, *model, postures.front());
     for (const JointVector& q : postures) {
       file.entries.push_back(read_arm(options.arm, *model, q));
       if (postures.size() > 1) {
         file.entries.back().prefix = "posture [" + std::to_string(file.entries.size() - 1) + "].";
       }
+    }
+    if (const auto& stiffness = file.entries.front().impedance.task_stiffness) {
+      warn_of(*model, *stiffness);
     }
   }
   if (options.region) {

@@ -1,6 +1,7 @@
 #include <dashpot/apps/tune/tuned_loop.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/gain_judge.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/settings_check.hpp>
@@ -20,6 +21,13 @@ nlohmann::ordered_json refusal_json(const std::string& key, const std::string& r
 nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
                                 const controller::JointVector& q) {
   nlohmann::ordered_json result = nlohmann::ordered_json::array();
+  const std::string lost = controller::lost_directions(arm.model(), q);
+  if (!lost.empty() && design.stated.mode == controller::Mode::kCartesian) {
+    result.push_back(refusal_json("q", "the posture is singular: no spring acts in direction " +
+                                           lost + "; a damping ratio is no advice here"));
+  }
+  const std::string heavy = controller::too_heavy(arm.model(), q);
+  if (!heavy.empty()) result.push_back(refusal_json("q", heavy));
   const controller::Gains& gains = design.settings.initial.gains;
   const bool null_space = !gains.null_stiffness.isZero(0) || !gains.null_damping.isZero(0);
   if (design.stated.kinematic_null_space && null_space) {
@@ -33,9 +41,10 @@ nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
   }
   for (const controller::Mode mode : {controller::Mode::kJoint, controller::Mode::kCartesian}) {
     const auto fault = controller::check_gains(gains, mode, arm.model().dof());
-    if (fault) result.push_back(refusal_json(fault.key, fault.reason));
+    if (!fault) continue;
+    result.push_back(refusal_json(fault.key, fault.reason));
+    return result;
   }
-  if (!result.empty()) return result;
   try {
     controller::Settings settings = design.settings;
     settings.analysis.where = controller::Analysis::Where::kOff;

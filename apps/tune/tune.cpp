@@ -3,6 +3,7 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/tune/tune_site.hpp>
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/posture.hpp>
@@ -58,15 +59,27 @@ nlohmann::ordered_json paper_design() {
   return {{"stiffness", {3000, 3000, 3000, 100, 100, 100}}, {"damping", json_rows(C)}};
 }
 
+/// The posture of --q, else the start of the configuration's scenario, else the usual one.
+controller::JointVector posture_of(const TuneOptions& options,
+                                   const controller::RobotModel& model) {
+  const controller::YamlNode document =
+      controller::parse_yaml(controller::read_regular_file(options.config));
+  if (options.posture.q.empty() && has_key(document, "scenario")) {
+    return load_scene(options.config).start;
+  }
+  return options.posture.read(model);
+}
+
 TuneSite make_site(const TuneOptions& options) try {
   if (!options.config.empty()) {
     const controller::Config config = controller::load_config(options.config);
+    warn_of(config.model);
     TunedArm arm(config.robot, &config.settings);
     const auto design = design_json(arm);
     auto other = design;
     const bool joint = design["mode"] == "joint";
     other[joint ? "joint_damping" : "damping"] = {{"ratio", 0.7}};
-    TuneStart start{options.posture.read(config.model),
+    TuneStart start{posture_of(options, config.model),
                     {design, other},
                     options.config,
                     listed(options, config.model)};
@@ -78,6 +91,7 @@ TuneSite make_site(const TuneOptions& options) try {
   take_drives(options.drives, robot.options);
   robot.options.payload = read_payload(options.payload);
   TunedArm arm(robot, nullptr);
+  warn_of(arm.model());
   auto a = design_json(arm);
   a["mode"] = "cartesian";
   a["null_stiffness"] = json_list(Eigen::VectorXd::Zero(arm.model().dof()));

@@ -53,7 +53,8 @@ class TunedLoop {
   analysis::Gears gears_;
 };
 
-/// Returns what the controller would refuse of a design at a posture: a list of {"key", "reason"}.
+/// Returns what the controller would refuse of a design at a posture, and under the key "q" what is
+/// wrong with the posture: a list of {"key", "reason"}.
 nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
                                 const controller::JointVector& q);
 

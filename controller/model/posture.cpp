@@ -1,6 +1,11 @@
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/posture.hpp>
 
+#include <Eigen/SVD>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <sstream>
 
@@ -21,16 +26,85 @@ bool fits_degrees(const RobotModel& model, const JointVector& q, double toleranc
   return true;
 }
 
+constexpr double kSingular = 0.02;     // of the largest singular value of J, in m and rad
+constexpr double kWellRegular = 0.05;  // likewise, where nobody chose the posture
+
+Eigen::MatrixXd jacobian(const RobotModel& model, const JointVector& q) {
+  return evaluate(model, q, JointVector::Zero(model.dof())).J;
+}
+
+/// The smallest singular value as a share of the largest.
+double regularity(const Eigen::MatrixXd& J) {
+  const Eigen::VectorXd values = Eigen::JacobiSVD<Eigen::MatrixXd>(J).singularValues();
+  return values[values.size() - 1] / values[0];
+}
+
 }  // namespace
 
-JointVector middle_posture(const RobotModel& model) {
-  JointVector q(model.dof());
+JointVector default_posture(const RobotModel& model) {
+  constexpr int kTried = 256;
+  JointVector middle(model.dof());
   for (int i = 0; i < model.dof(); ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
     const double sum = joint.lower + joint.upper;
-    q[i] = std::isfinite(sum) ? 0.5 * sum : 0;
+    middle[i] = std::isfinite(sum) ? 0.5 * sum : 0;
   }
-  return q;
+  if (regularity(jacobian(model, middle)) >= kWellRegular) return middle;
+  const PostureSequence postures(model.joint_values(&Joint::lower),
+                                 model.joint_values(&Joint::upper));
+  JointVector nearest = middle;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kTried; ++k) {
+    const JointVector q = postures.at(k);
+    const double distance = (q - middle).norm();
+    if (distance >= least || regularity(jacobian(model, q)) < kWellRegular) continue;
+    nearest = q;
+    least = distance;
+  }
+  return nearest;
+}
+
+std::string lost_directions(const RobotModel& model, const JointVector& q) {
+  static constexpr std::array<const char*, 6> kNames = {"x", "y", "z", "rx", "ry", "rz"};
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(jacobian(model, q), Eigen::ComputeFullU);
+  std::ostringstream text;
+  text.precision(2);
+  for (Eigen::Index k = 0; k < svd.singularValues().size(); ++k) {
+    if (svd.singularValues()[k] > kSingular * svd.singularValues()[0]) continue;
+    Eigen::VectorXd u = svd.matrixU().col(k);
+    Eigen::Index largest = 0;
+    u.cwiseAbs().maxCoeff(&largest);
+    u /= u[largest];
+    text << (text.tellp() > 0 ? ", " : "") << kNames[static_cast<std::size_t>(largest)];
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      if (i == largest || std::abs(u[i]) < 0.05) continue;
+      text << (u[i] < 0 ? " - " : " + ") << std::abs(u[i]) << ' '
+           << kNames[static_cast<std::size_t>(i)];
+    }
+  }
+  return text.str();
+}
+
+std::string too_heavy(const RobotModel& model, const JointVector& q) {
+  const JointVector weight = evaluate(model, q, JointVector::Zero(model.dof())).gravity;
+  const JointVector effort = model.joint_values(&Joint::effort);
+  Eigen::Index worst = -1;
+  for (Eigen::Index i = 0; i < weight.size(); ++i) {
+    const bool held = !(effort[i] > 0) || std::abs(weight[i]) <= effort[i];
+    if (held) continue;
+    if (worst < 0 || std::abs(weight[i]) * effort[worst] > std::abs(weight[worst]) * effort[i]) {
+      worst = i;
+    }
+  }
+  if (worst < 0) return "";
+  const Joint& joint = model.joints()[static_cast<std::size_t>(worst)];
+  const char* unit = joint.type == JointType::kPrismatic ? " N" : " N m";
+  std::ostringstream line;
+  line.precision(4);
+  line << "the arm cannot hold itself here: joint '" << joint.name << "' needs "
+       << std::abs(weight[worst]) << unit << ", its effort limit is " << joint.effort << unit;
+  if (model.attachment().mass > 0) line << " (the payload is " << model.attachment().mass << " kg)";
+  return line.str();
 }
 
 std::string outside_limits(const RobotModel& model, const JointVector& q, double tolerance) {
@@ -64,6 +138,12 @@ std::string start_fault(const RobotModel& model, const Settings& settings, const
       line << "joint '" << joint.name << "' at " << q[i]
            << " is more than a turn outside its limits "
            << "of position; degrees? A start is given in rad and m";
+      return line.str();
+    }
+    if (std::abs(weight[i]) > settings.limits.torque[i]) {
+      line << "joint '" << joint.name << "' needs " << std::abs(weight[i])
+           << " N m to hold the arm and its payload here, limits.torque allows "
+           << settings.limits.torque[i];
       return line.str();
     }
     if (torque.size() == 0 || std::isinf(largest)) continue;

@@ -214,7 +214,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     given = None if postures is None else to_numbers("postures", postures, 2)
     samples = samples if given is None else len(given)
     if q is None and samples == 0 and damping_ratio is None:
-        q = robot._core.middle_posture()
+        q = robot._core.default_posture()
     if not outside_limits:
         check_postures(robot, "q", [] if q is None else [to_numbers("q", q, 1)])
         check_postures(robot, "postures", [] if given is None else given)

@@ -163,8 +163,8 @@ void add_robot(nb::module_& m) {
            [](const Robot& robot, const Vector& q) {
              return controller::outside_limits(robot.model, robot.joint_vector("q", q));
            })
-      .def("middle_posture",
-           [](const Robot& robot) { return to_array(controller::middle_posture(robot.model)); })
+      .def("default_posture",
+           [](const Robot& robot) { return to_array(controller::default_posture(robot.model)); })
       .def("warnings", [](const Robot& robot) { return robot.model.warnings(); })
       .def("missing_rotors",
            [](const Robot& robot) { return controller::missing_rotors_text(robot.model); })

@@ -77,7 +77,7 @@ TEST(Inspect, PrintsWhatKdlComputesForEachArm) {
     const controller::RobotModel model = dashpot::testing::arm_model(arm);
     const bool six = model.dof() == 6;
     const std::string qd = six ? "1,0,-1,0.5,2,-2" : "1,0,-1,0.5,2,-2,1e-1";
-    controller::JointVector position = controller::middle_posture(model), velocity(model.dof());
+    controller::JointVector position = controller::default_posture(model), velocity(model.dof());
     std::string q;
     for (int i = 0; i < model.dof(); ++i) {
       position[i] += (i % 2 == 0 ? 0.1 : -0.1) * (i + 1);

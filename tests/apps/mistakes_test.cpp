@@ -74,6 +74,9 @@ TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
   EXPECT_THAT(heavy.err, ::testing::HasSubstr("warning: payload: its mass, 800 kg, "));
   EXPECT_THAT(heavy.err, ::testing::HasSubstr(": is it in g, or "));
   EXPECT_EQ(run_program(joined(audit, {"--payload", "0.8"})).err, "");
+  const Outcome turned = run_program(
+      of_panda("audit", {"--stiffness", "20,20,20,600,600,600", "--damping-factor", "2"}));
+  EXPECT_THAT(turned.err, ::testing::HasSubstr("warning: task stiffness: 600 N m/rad against "));
   const Outcome percent = run_program(joined(design, {"7"}));
   EXPECT_EQ(percent.status, 0);
   EXPECT_THAT(percent.err, ::testing::HasSubstr("no percentage: 7 % would be 0.07\n"));
@@ -83,6 +86,8 @@ TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
 TEST(Mistakes, OfTwoDampingsOrNoneAreTold) {
   const Words audit = of_panda("audit", kStiffness);
   expect_refusal(run_program(audit), "--damping: missing; give it, or --damping-factor");
+  expect_refusal(run_program(joined(audit, {"--damping-ratio", "0.7"})),
+                 "or --damping-factor; dashpot design finds the damping for a --damping-ratio");
   expect_refusal(run_program(joined(audit, {"--damping", "1,1,1,1,1,1", "--damping-factor", "2"})),
                  "--damping: does not go with --damping-factor");
   expect_refusal(run_program(of_panda("audit", {"--joint-stiffness", "9", "--joint-damping", "1",

@@ -1,4 +1,5 @@
 // Postures of the command line: one default, refused where the arm cannot be.
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/scratch.hpp>
@@ -35,16 +36,57 @@ TEST(Postures, OutsideTheLimitsAreRefusedUnlessAskedFor) {
     expect_refusal(ask_panda(command, gains, {"--q", "0,-45,0,-135,0,90,45"}),
                    "--q: joint 'panda_joint2' at -45 rad is outside its limits -1.7628 to 1.7628 "
                    "rad; if these are degrees");
-    expect_refusal(ask_panda(command, gains, {"--q", "0,0,0,0,0,1.5,0"}),
-                   "joint 'panda_joint4' at 0 rad is outside its limits -3.0718 to -0.0698 rad; "
+    expect_refusal(ask_panda(command, gains, {"--q", "0,1.9,0,-1.5,0,1.5,0"}),
+                   "joint 'panda_joint2' at 1.9 rad is outside its limits -1.7628 to 1.7628 rad; "
                    "--outside-limits");
     expect_refusal(ask_panda(command, gains, {"--q", "0,-45,0,-135 deg,0,90,45"}),
                    "--q: '-45' has no unit beside '-135 deg'");
-    const Outcome taken = ask_panda(command, gains, {"--q", "0,0,0,0,0,1.5,0", "--outside-limits"});
+    const Outcome taken =
+        ask_panda(command, gains, {"--q", "0,1.9,0,-1.5,0,1.5,0", "--outside-limits"});
     EXPECT_EQ(taken.status, 0);
     EXPECT_EQ(count_lines(taken.err), 1);
-    EXPECT_THAT(taken.err, HasSubstr("warning: --q: joint 'panda_joint4'"));
+    EXPECT_THAT(taken.err, HasSubstr("warning: --q: joint 'panda_joint2'"));
   }
+}
+
+/// Nobody designs damping where a direction has no spring.
+TEST(Postures, ThatAreSingularAreRefusedOrAvoided) {
+  const std::string straight = "0,0,0,-0.0698,0,1.5,0";
+  const Outcome refused = ask_panda("design", kSprings, {"--q", straight});
+  expect_refusal(refused, "--q: the posture is singular: no spring acts in direction y - 0.24 rz");
+  EXPECT_EQ(
+      ask_panda("design", {"--joint-stiffness", "9", "--damping-ratio", "0.7"}, {"--q", straight})
+          .status,
+      0);
+  for (const testing::Arm& arm : testing::all_arms()) {
+    const controller::RobotModel model = testing::arm_model(arm);
+    const controller::JointVector q = controller::default_posture(model);
+    EXPECT_EQ(controller::lost_directions(model, q), "") << arm.file;
+    EXPECT_EQ(controller::outside_limits(model, q), "") << arm.file;
+  }
+}
+
+TEST(Postures, AtWhichTheArmCannotHoldItselfAreNamed) {
+  const Outcome heavy = ask_panda("audit", kGains, {"--payload", "40"});
+  EXPECT_EQ(heavy.status, 0);
+  EXPECT_THAT(heavy.err, HasSubstr("warning: --q: the arm cannot hold itself here: joint "
+                                   "'panda_joint6' needs "));
+  EXPECT_THAT(heavy.err, HasSubstr(" N m, its effort limit is "));
+}
+
+/// As `dashpot tune` exports them.
+TEST(Postures, OfGainsWithARatioHaveThatRatio) {
+  const Scratch scratch;
+  const std::string file = scratch.write("gains.yaml",
+                                         "gains: {task: {stiffness: [400, 400, 400, 30, 30, 30], "
+                                         "damping_ratio: 0.6}}\n");
+  const Outcome outcome =
+      ask_panda("audit", {"--gains", file}, {"--json", "--samples", "40", "--drives", "panda"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const Json result = parse(outcome);
+  EXPECT_NEAR(result["posture"]["smallest_ratio"].get<double>(), 0.6, 1e-6);
+  EXPECT_NEAR(result["workspace"]["smallest_ratio"]["median"].get<double>(), 0.6, 1e-3);
+  EXPECT_GT(result["workspace"]["smallest_ratio"]["p05"].get<double>(), 0.5);
 }
 
 TEST(Postures, OfAFileAreCheckedOneByOne) {

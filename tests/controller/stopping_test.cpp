@@ -75,7 +75,7 @@ TEST(Stopping, ASlowTorqueRateIsNamedWithOneThatWouldDo) {
 TEST(Stopping, DefaultsAreFastEnough) {
   for (const testing::Arm& arm : testing::all_arms()) {
     const RobotModel model = arm_model(arm);
-    EXPECT_EQ(slow_stop(model, default_settings(model), middle_posture(model)), "") << arm.file;
+    EXPECT_EQ(slow_stop(model, default_settings(model), default_posture(model)), "") << arm.file;
   }
 }
 

@@ -228,11 +228,13 @@ function armDifference() {
   return Object.keys(names).filter((key) => JSON.stringify(told('a', key)) !== JSON.stringify(told('b', key))).map((key) => names[key]);
 }
 
+const kMostGood = 1.5; // a mode that is damped more creeps
+
 /// Tables, chips, arrows and texts: all but the drawings.
 function tell() {
   const [a, b] = kDesigns.map((name) => answer(name)), modes = (from, i) => (from && from.modes[i]) || null;
   const count = Math.max(a ? a.modes.length : 0, b ? b.modes.length : 0);
-  const good = (mode, from) => (mode && mode.damping_ratio !== null ? (mode.damping_ratio >= 0.6 && !unstable(from) ? 'good' : 'bad') : '');
+  const good = (mode, from) => (mode && mode.damping_ratio !== null ? (mode.damping_ratio >= 0.6 && mode.damping_ratio <= kMostGood && !unstable(from) && !from.refused.some(({key}) => key === 'q') ? 'good' : 'bad') : '');
   $('rows').replaceChildren(...Array.from({length: count}, (_, i) => {
     const ma = modes(a, i), mb = modes(b, i), first = cell('');
     first.append(markElement(i + 1), ` ${i + 1}`);
@@ -281,7 +283,7 @@ function outside() {
 
 function tellRefused() {
   const problem = page.problem[store.state.edited], mine = answer();
-  const all = problem ? [{key: problem.split(':')[0], reason: problem}] : mine ? mine.refused.map(({key, reason}) => ({key, reason: `The controller refuses it: ${reason.startsWith(key) ? reason : `${key}: ${reason}`}.`})) : [];
+  const all = problem ? [{key: problem.split(':')[0], reason: problem}] : mine ? mine.refused.map(({key, reason}) => ({key, reason: key === 'q' ? `Here ${reason}.` : `The controller refuses it: ${reason.startsWith(key) ? reason : `${key}: ${reason}`}.`})) : [];
   if (!problem && setup.rotors_unknown && !(design().arm || {}).reflected_inertia) {
     $('reads').textContent = 'rotors unknown: fast modes and margin are those without them';
   } else {

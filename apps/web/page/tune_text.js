@@ -53,7 +53,7 @@ function configuration({setup, q, design, answer}) {
   const sampled = {...unusual('delay', 0), ...unusual('cutoff', 0), ...unusual('difference_velocity', false)};
   const sections = {robot, control: {period: design.period, mode: design.mode}, gains, limits: unusual('gain_margin', setup.usual_margin),
     integral: unusual('integral_time', 0, 'time'), analysis: Object.keys(sampled).length ? {sampled} : {}};
-  const refused = answer.refused.map(({key, reason}) => `The controller refuses it: ${key}: ${reason}.`);
+  const refused = answer.refused.map(({key, reason}) => (key === 'q' ? `Here ${reason}.` : `The controller refuses it: ${key}: ${reason}.`));
   const lines = Object.entries(sections).filter(([, value]) => Object.keys(value).length).map(([key, value]) => `${key}:\n` +
     Object.entries(value).map(([name, inner]) => `  ${name}: ${JSON.stringify(inner)}\n`).join(''));
   return notes([setup.robot.config && `These keys take the place of those of ${setup.robot.config}, which keeps its others.`, `q: ${JSON.stringify(q)}`, ...refused]) + lines.join('');
