@@ -181,7 +181,11 @@ void send(const CommandOptions& options) {
   }
   lcmtypes::MessageHandlers handlers;
   std::optional<state_t> state;
-  handlers.on_state = [&](const state_t& message) { state = message; };
+  int backward = 0;  // ticks of one loop rise
+  handlers.on_state = [&](const state_t& message) {
+    if (state && message.tick < state->tick) ++backward;
+    state = message;
+  };
   lcmtypes::BusReader reader(bus, handlers);
   const auto until = [&](double seconds, const auto& done) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
@@ -191,6 +195,12 @@ void send(const CommandOptions& options) {
   if (!until(options.timeout, [&] { return state.has_value(); })) {
     throw std::runtime_error("no loop publishes states on " + url +
                              "; is one running, and with this --lcm-url?");
+  }
+  constexpr double kListened = 0.1;  // s
+  constexpr int kInterleaved = 3;
+  if (until(kListened, [&] { return backward >= kInterleaved; })) {
+    throw std::runtime_error("several loops publish states on " + url +
+                             ", and each would take the command: give each a bus of its own");
   }
   command_t command = make_command(options, *state);
   std::random_device random;

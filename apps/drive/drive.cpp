@@ -1,3 +1,4 @@
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
@@ -178,6 +179,8 @@ void drive(const DriveOptions& options) {
   if (!options.excite.empty()) {
     excitation = read_excitation(options.excite, file.config.settings);
   }
+  warn_of(file.config.model);
+  warn_of(file.config.model, file.config.settings.initial.gains.task_stiffness);
   const PluginLibrary plugin(options.plugin);
   const auto controller = plugin.create(options.config, file.config.model.dof());
   constexpr double kRepeat = 0.1;  // s between two repetitions of a set-point
@@ -186,7 +189,10 @@ void drive(const DriveOptions& options) {
   if (excitation) goal.excite(*excitation);
   const std::shared_ptr<lcm::LCM> bus = drive_bus(options);
   std::optional<CommandSource> commands;
-  if (options.commands) commands.emplace(drive_bus(options), file.commands, goal);
+  if (options.commands) {
+    refuse_second_loop(bus);
+    commands.emplace(drive_bus(options), file.commands, goal);
+  }
   lcmtypes::Publisher publisher(drive_sinks(options, bus));
   LoopJournal journal(*controller, goal, publisher, commands ? &*commands : nullptr,
                       LoopJournal::Pace::kRealTime);

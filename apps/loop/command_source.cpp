@@ -1,6 +1,9 @@
 #include <dashpot/apps/loop/command_source.hpp>
 #include <dashpot/controller/attachment.hpp>
+#include <dashpot/controller/input_error.hpp>
+#include <dashpot/lcmtypes/message_reader.hpp>
 
+#include <chrono>
 #include <utility>
 
 namespace dashpot::apps {
@@ -32,6 +35,21 @@ bool carry_out(Command& command, LoopGoal& goal, std::string& reason) {
 }
 
 }  // namespace
+
+void refuse_second_loop(const std::shared_ptr<lcm::LCM>& bus) {
+  constexpr std::chrono::milliseconds kListened{300};  // states come every period
+  bool heard = false;
+  lcmtypes::MessageHandlers handlers;
+  handlers.on_state = [&heard](const state_t& /*message*/) { heard = true; };
+  lcmtypes::BusReader reader(bus, handlers);
+  const auto end = std::chrono::steady_clock::now() + kListened;
+  while (!heard && std::chrono::steady_clock::now() < end) reader.wait(20);
+  if (!heard) return;
+  throw controller::InputError(
+      "--commands",
+      "another loop publishes states on this bus, and both would take each "
+      "command: end it, or give this one a bus of its own (--lcm-url)");
+}
 
 CommandSource::CommandSource(std::shared_ptr<lcm::LCM> bus, const lcmtypes::CommandLimits& limits,
                              LoopGoal& goal)

@@ -8,6 +8,10 @@
 
 namespace dashpot::apps {
 
+/// Listens for a moment, and throws InputError if another loop publishes its states on the bus:
+/// both would take each command.
+void refuse_second_loop(const std::shared_ptr<lcm::LCM>& bus);
+
 /// Takes commands for a loop from a bus. Gains, payload, tool, speeds and releases go to the
 /// controller on the receiver's thread, because they are judged, which may take milliseconds; what
 /// it refuses is refused whole. The rest goes to the loop's thread.

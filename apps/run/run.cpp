@@ -100,7 +100,10 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
   RunReport report;
   report.pace = options.fast ? Pace::kFast : Pace::kRealTime;
   std::optional<CommandSource> commands;
-  if (options.commands) commands.emplace(bus, scene.commands, loop.goal());
+  if (options.commands) {
+    refuse_second_loop(bus);
+    commands.emplace(bus, scene.commands, loop.goal());
+  }
   lcmtypes::Publisher publisher(make_sinks(options, scene, bus));
   if (!options.fast) publisher.start();
   const double period = scene.plant.period;
@@ -164,6 +167,11 @@ void run(const Options& options) {
     excitation = read_excitation(options.excite, scene.arm->config.settings);
   }
   if (options.duration) scene.duration = *options.duration;
+  if (scene.arm) {
+    const controller::Config& config = scene.arm->config;
+    warn_of(config.model);
+    warn_of(config.model, config.settings.initial.gains.task_stiffness);
+  }
   std::optional<PluginLibrary> plugin;
   if (scene.arm) plugin.emplace(options.plugin);
   if (!scene.arm && !options.plugin.empty()) {
@@ -184,7 +192,6 @@ void run(const Options& options) {
   report.joints = scene.dof();
   if (scene.arm) {
     const controller::RobotModel& model = scene.arm->config.model;
-    warn_of(model);
     report.missing_rotors = controller::missing_rotors_text(model);
     report.friction_text = controller::friction_text(model);
     report.drives = scene.arm->config.robot.options.drives;

@@ -7,7 +7,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <csignal>
 #include <string>
+#include <utility>
 
 namespace dashpot::tests {
 namespace {
@@ -76,6 +78,22 @@ TEST(CommandProgram, TakesNoOtherCommandForItsOwn) {
   }
   EXPECT_EQ(program.finish(), 1) << program.output();
   EXPECT_THAT(program.complaints(), HasSubstr("no answer"));
+}
+
+TEST(CommandProgram, IsForOneLoopOnABus) {
+  LiveRun one(scene("panda"));
+  if (!one.heard()) GTEST_SKIP() << kNoMulticast;
+  expect_refusal(run_program({"run", scene("panda"), "--commands", "--lcm-url", one.url}),
+                 "--commands: another loop publishes states on this bus");
+  Running other({"run", scene("panda"), "--lcm-url", one.url});
+  std::int64_t last = 0;
+  EXPECT_TRUE(one.until([&] { return one.state.tick < std::exchange(last, one.state.tick); }));
+  const Outcome both = command(one, {"--mode", "joint"});
+  EXPECT_EQ(both.status, 1);
+  EXPECT_THAT(both.err, HasSubstr("several loops publish states on " + one.url));
+  other.send(SIGTERM);
+  other.finish();
+  one.end();
 }
 
 TEST(CommandProgram, SaysWhereNobodyListens) {
