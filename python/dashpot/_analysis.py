@@ -73,9 +73,12 @@ def response(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
 
 
 def receptance(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
-               omega: float) -> ComplexArray:
-    """Returns H = (K + i omega C - omega^2 M)^-1 (n x n) at omega (rad/s), from the modes."""
-    return np.asarray(_core.receptance(_impedance(M, C, K, None, None, None), omega))
+               omega: npt.ArrayLike) -> ComplexArray:
+    """Returns H = (K + i omega C - omega^2 M)^-1 (n x n) at omega (rad/s), from the modes, or for
+    many frequencies (an array) one after the other (..., n x n)."""
+    system, at = _impedance(M, C, K, None, None, None), np.asarray(omega, dtype=np.float64)
+    each = [_core.receptance(system, one) for one in at.ravel().tolist()]
+    return np.asarray(each).reshape(at.shape + np.shape(each[0]) if each else (0, 0, 0))
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -92,6 +92,14 @@ def _columns(name: str, what: str, given: Any, records: int, many: bool) -> list
     return columns
 
 
+def _check_rows(name: str, what: str, values: Sequence[Array], times: Sequence[Array]) -> None:
+    """Raises Error for records that have their samples side by side."""
+    for value, time in zip(values, times):
+        if value.shape[1] != len(time) and value.shape[0] == len(time):
+            raise Error(f"{name}: has {len(time)} columns and {value.shape[1]} rows, expected "
+                        f"{len(time)} samples x {what}; give its transpose")
+
+
 def _topic(joints: Mapping[str, Any]) -> tuple[Array, Array]:
     """Times and positions of a topic of JointState, of the joints and messages that have both."""
     for field in ("time", "position"):
@@ -139,15 +147,17 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike] | Mapping[str, Any],
         raise Error("identify: y is missing")
     many = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
     times: list[Any] = list(t) if many else [t]  # type: ignore[arg-type]
+    instants = [to_numbers("t", time, 1) for time in times]
     values = _columns("y", "channels", y, len(times), many)
+    _check_rows("y", "channels", values, instants)
     if input is None:
         inputs = [np.empty((0, 0))] * len(times)
     elif ambient:
         raise Error("identify: ambient motion is that whose input was not measured")
     else:
         inputs = _columns("input", "inputs", input, len(times), many)
-    found = _core.identify([to_numbers("t", time, 1) for time in times], values, inputs, find,
-                           ambient, max_order)
+        _check_rows("input", "inputs", inputs, instants)
+    found = _core.identify(instants, values, inputs, find, ambient, max_order)
     channels = values[0].shape[0]
     return Identification(modes=_measured(found.pop("modes"), channels),
                           rejected=_measured(found.pop("rejected"), channels), **found)

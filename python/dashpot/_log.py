@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._bags import is_bag, read_bag
+from ._core import Error
 from ._results import Array, ComplexArray, IntArray, Result, TextArray
 
 
@@ -106,6 +107,9 @@ def read_log(path: str | os.PathLike[str], *, topics: Sequence[str] | None = Non
     if is_bag(file):
         return Log(read_bag(file, topics, types))
     channels, malformed, damage = _core.read_log(file)
+    if not channels:
+        raise Error(f"{file}: has no messages{f' ({damage})' if damage else ''}; LCM logs, rosbags "
+                    "and MCAP files are read")
     if damage:
         warnings.warn(f"{file}: {damage}", stacklevel=2)
     for channel, count in malformed.items():

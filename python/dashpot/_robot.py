@@ -305,6 +305,17 @@ def check_postures(robot: Robot, name: str, postures: Iterable[Array]) -> None:
             raise Error(f"{name}{'' if name == 'q' else f'[{i}]'}: {complaint}")
 
 
+def one_damping(part: str, stiffness: npt.ArrayLike | None, damping: npt.ArrayLike | None,
+                ratio: float) -> None:
+    """Raises Error unless springs have one damping: a matrix or a ratio."""
+    both = f"{part}_damping and {part}_damping_ratio"
+    if damping is not None and ratio:
+        raise Error(f"{both}: either, not both")
+    if stiffness is not None and np.any(stiffness) and damping is None and not ratio:
+        raise Error(f"{both}: one of them is wanted beside {part}_stiffness; {part}_damping = zeros "
+                    "is a loop without damping")
+
+
 def selected(directions: Sequence[str]) -> list[bool]:
     """Returns which of the six directions are named."""
     for direction in directions:
@@ -376,7 +387,8 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     the base's axes) at q; `load` says how it moves with the arm, which adds stiffness: base_wrench,
     tool_wrench (it turns with the tip), joint_torques (its joint torques are constant).
 
-    Raises Error for a posture or gains that the controller would refuse.
+    Raises Error for a posture outside the position limits, gains that the controller would refuse,
+    and springs with no damping or two.
     """
     if load not in LOADS:
         raise Error(f"load: {load!r} is none of {', '.join(LOADS)}")
@@ -384,13 +396,20 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     at_tip = joint_stiffness is None and joint_damping is None and joint_damping_ratio == 0
     if not at_tip and not (task_stiffness is None and task_damping is None):
         raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
+    posture = _joint_values("q", q)
+    check_postures(robot, "q", [posture])
     gains = _core.Gains(robot._core, gains_text(
         joint_stiffness=joint_stiffness, joint_damping=joint_damping,
         joint_damping_ratio=joint_damping_ratio, task_stiffness=task_stiffness,
         task_damping=task_damping, task_damping_ratio=task_damping_ratio, task_frame=frame,
         task_directions=list(directions), null_stiffness=null_stiffness,
         null_damping=null_damping, null_damping_ratio=null_damping_ratio))
-    found = _core.closed_loop(robot._core, _joint_values("q", q), gains, at_tip,
+    for part, stiffness, damping, ratio in (
+            ("joint", joint_stiffness, joint_damping, joint_damping_ratio),
+            ("task", task_stiffness, task_damping, task_damping_ratio),
+            ("null", null_stiffness, null_damping, null_damping_ratio)):
+        one_damping(part, stiffness, damping, ratio)
+    found = _core.closed_loop(robot._core, posture, gains, at_tip,
                               to_vector("external_wrench", external_wrench), kind, soft_frequency)
     return ClosedLoop(found["mass"], found["damping"], found["stiffness"],
                       make_modes(found["modes"]))

@@ -164,6 +164,7 @@ def test_responses_are_those_of_the_matrix_exponential():
         np.testing.assert_allclose(pushed.position[i], step, atol=1e-10)
     H = dashpot.receptance(M, C, K, 3.0)
     np.testing.assert_allclose(H @ (K + 3j * C - 9 * M), np.eye(5), atol=1e-10)
+    assert np.array_equal(dashpot.receptance(M, C, K, [3.0, 5.0])[0], H)
     with pytest.raises(dashpot.Error):
         dashpot.response(M, C, K, times, force=[1, 2])
 

@@ -335,3 +335,6 @@ def test_modes_at_a_posture_are_those_of_the_loop(config, panda):
     assert len(controller.modes_at(HOME)) == 7 and found.shapes.shape == (7, 7)
     with pytest.raises(dashpot.Error, match="q: "):
         controller.modes_at([0] * 6)
+    for call in (controller.modes_at, controller.start, controller.judge_gains):
+        with pytest.raises(dashpot.Error, match="'panda_joint2' at -44.* if these are degrees"):
+            call(np.degrees(HOME))

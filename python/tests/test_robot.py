@@ -121,7 +121,7 @@ def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
     q = np.array(HOME) + 0.3  # where the axes of the tool are not those of the base
     R = np.kron(np.eye(2), panda.pose(q)[:3, :3])
     K = np.diag([2000.0, 600, 100, 10, 20, 30])
-    tool = dashpot.closed_loop(panda, q, task_stiffness=K, frame="tool")
+    tool = dashpot.closed_loop(panda, q, task_stiffness=K, task_damping=[0] * 6, frame="tool")
     np.testing.assert_allclose(
         tool.stiffness, panda.jacobian(q).T @ R @ K @ R.T @ panda.jacobian(q), atol=1e-9)
     position = dashpot.closed_loop(panda, HOME, **TASK, directions=["x", "y", "z"])
@@ -137,7 +137,8 @@ def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
     np.testing.assert_allclose(turning.stiffness - found.stiffness, -J[:3].T @ across, atol=1e-9)
     N = np.eye(7) - np.linalg.solve(panda.mass(HOME), J.T) @ np.linalg.solve(
         J @ np.linalg.solve(panda.mass(HOME), J.T), J)
-    posture = dashpot.closed_loop(panda, HOME, **TASK, null_stiffness=[5.0] * 7)
+    posture = dashpot.closed_loop(panda, HOME, **TASK, null_stiffness=[5.0] * 7,
+                                  null_damping=[0] * 7)
     np.testing.assert_allclose(posture.stiffness - found.stiffness, 5 * N.T @ N, atol=1e-9)
 
 
@@ -159,7 +160,16 @@ def test_a_closed_loop_that_cannot_be_is_refused(panda):
             (dict(task_stiffness=[1] * 6, joint_stiffness=[1] * 7), "not both"),
             (dict(task_stiffness=[1] * 6, frame="world"), "gains.task.frame: .*'world'"),
             (dict(task_stiffness=[1] * 6, directions=["w"]), "gains.task.directions: .*'w'"),
-            (dict(task_stiffness=[1] * 6, external_wrench=[1, 2]), "external_wrench"),
+            (dict(task_stiffness=[1] * 6, task_damping=[1] * 6, task_damping_ratio=0.7),
+             "task_damping and task_damping_ratio: either, not both"),
+            (dict(task_stiffness=[1] * 6), "task_damping and task_damping_ratio: one of them"),
+            (dict(joint_stiffness=[1] * 7), "joint_damping and joint_damping_ratio: one of them"),
+            (dict(task_stiffness=[1] * 6, task_damping=[1] * 6, null_stiffness=[1] * 7),
+             "null_damping and null_damping_ratio: one of them"),
+            (dict(task_stiffness=[1] * 6, task_damping=[1] * 6, external_wrench=[1, 2]),
+             "external_wrench"),
             (dict(task_stiffness=[1] * 6, external_wrench=[1] * 6, load="x"), "load: 'x'")]:
         with pytest.raises(dashpot.Error, match=message):
             dashpot.closed_loop(panda, HOME, **given)
+    with pytest.raises(dashpot.Error, match="q: joint '.*' at .* rad is outside .*; if these are deg"):
+        dashpot.closed_loop(panda, np.degrees(HOME), **TASK)
