@@ -22,11 +22,12 @@ Outcome command(const LiveRun& live, const Words& words) {
 
 TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
   const Scratch scratch;
-  // No fault, also where a busy machine makes the loop slow.
+  // No fault, also where a busy machine makes the loop slow, and no command that ends by silence or
+  // by what the scene has to be done later.
   LiveRun live(changed(
-      scratch, "panda",
+      scratch, "panda_release_c2",
       {{"tip: panda_hand_tcp", "tip: panda_hand_tcp\n  drives: panda"},
-       {"    reflected_inertia: 0 kg m^2\n", ""},
+       {"scenario:", "commands: {silence: 30 s, oldest: 20 s}\nscenario:"},
        {"control:", "watchdog: {feedback: 0, longest_gap: 1 s}\ncontrol:\n  period: 4 ms"}}));
   if (!live.heard(1)) GTEST_SKIP() << kNoMulticast;
   const Outcome moved = command(
@@ -40,7 +41,8 @@ TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
   EXPECT_EQ(softer.out, "accepted\n") << softer.err;
   EXPECT_TRUE(live.until([&] {
     return live.modes.num_modes >= 6 && std::abs(live.modes.damping_ratio[0] - 0.9) < 0.05;
-  }));
+  })) << "fault "
+      << int{live.state.fault} << ", mode " << int{live.state.mode};
   // What the loop refuses is an error of the program's, with the loop's reason.
   const Outcome far = command(live, {"--joint-position", "0,-0.8,0,-2.4,0,1.6,40"});
   EXPECT_EQ(far.status, 1);

@@ -43,7 +43,7 @@ class Drive : public ::testing::TestWithParam<Arm> {
     Running fake(driver({"--trouble", trouble, "--from", "2", "--lasts", lasts}));
     Running driving(drive(changed_configuration(
         scratch, arm, {{"analysis:", "watchdog: {longest_gap: " + longest_gap + "}\nanalysis:"}})));
-    seen = listener.until([&] { return listener.states > 100; });
+    seen = listener.until([&] { return listener.states > 100; }, driving);
     if (!seen) return {};
     // The simulated time of the driver.
     listener.until([&] {
@@ -81,15 +81,17 @@ void Drive::hold_and_move() {
   const std::string log = scratch.path("drive.lcm");
   Running driving(drive(config, {"--commands", "--log", log}));
   double first = -1;
-  const bool heard = listener.until([&] {
-    if (first < 0 && listener.states > 0) {
-      first = 0;
-      for (const double torque : listener.state.joint_torque) {
-        first = std::max(first, std::abs(torque));
-      }
-    }
-    return listener.states > 100;
-  });
+  const bool heard = listener.until(
+      [&] {
+        if (first < 0 && listener.states > 0) {
+          first = 0;
+          for (const double torque : listener.state.joint_torque) {
+            first = std::max(first, std::abs(torque));
+          }
+        }
+        return listener.states > 100;
+      },
+      driving);
   if (!heard) GTEST_SKIP() << kNoMulticast;
   EXPECT_LT(first, 0.01);  // N m
   const double start = listener.state.joint_position[0];
@@ -142,7 +144,7 @@ TEST_P(Drive, StopsTheArmBeforeTheTorqueFades) {
   Running fake(driver());
   const std::string log = scratch.path("drive.lcm");
   Running driving(drive(config, {"--commands", "--log", log}));
-  if (!listener.until([&] { return listener.states > 100; })) GTEST_SKIP() << kNoMulticast;
+  if (!listener.until([&] { return listener.states > 100; }, driving)) GTEST_SKIP() << kNoMulticast;
   std::int64_t sent = -1;
   ASSERT_TRUE(listener.until([&] {
     if (listener.state.commander == 0 && (sent < 0 || listener.states - sent > 500)) {
@@ -162,7 +164,8 @@ TEST_P(Drive, StopsTheArmBeforeTheTorqueFades) {
   });
   ASSERT_NE(stops, states.end());
   const double way = states.back().joint_position[0] - stops->joint_position[0];
-  EXPECT_LT(std::abs(way), 0.02) << "from " << stops->joint_velocity[0] << " rad/s";
+  const double speed = stops->joint_velocity[0];  // the later this test hears, the more
+  EXPECT_LT(std::abs(way), 0.01 + 0.1 * speed) << "from " << speed << " rad/s";
   double fastest = 0;
   for (const state_t& one : states) {
     const bool fades = one.utime > states.back().utime - 190'000;
@@ -184,7 +187,8 @@ TEST_P(Drive, CommandsNothingInADryRun) {
   Listener listener(url);
   Running fake(driver());
   Running driving(drive(configuration(arm.name), {"--dry-run"}));
-  if (!listener.until([&] { return listener.states > 100 && listener.modes_messages > 0; })) {
+  if (!listener.until([&] { return listener.states > 100 && listener.modes_messages > 0; },
+                      driving)) {
     GTEST_SKIP() << kNoMulticast;
   }
   EXPECT_EQ(listener.modes.num_modes, 7);
@@ -224,20 +228,19 @@ TEST_P(Drive, RefusesADriverOfAnotherPeriod) {
   EXPECT_THAT(outcome.err, HasSubstr("control.period: is 2 ms, but the driver's statuses come"));
 }
 
-/// Publishes commands of somebody else until `driving` complains, for three seconds at most.
-void command_as_well(const Arm& arm, const std::string& url, const Running& driving) {
+/// Publishes commands of somebody else until `driving` ends, which complains of them.
+void command_as_well(const Arm& arm, const std::string& url, Running& driving) {
   const auto bus = lcmtypes::open_bus(url);
   std::vector<std::uint8_t> bytes;
   lcmtypes::DriverCommand command;
   command.torque = controller::JointVector::Zero(7);
   if (arm.kind == DriverKind::kIiwa) command.position = command.torque;
-  for (int k = 0; k < 600; ++k) {
+  for (const auto end = Clock::now() + kHang; !driving.ended() && Clock::now() < end;) {
     command.utime = utime();
     encode(arm.kind, command, bytes);
     bus->publish(lcmtypes::profile_of(arm.kind).command_channel, bytes.data(),
                  static_cast<unsigned>(bytes.size()));
     usleep(5000);
-    if (driving.complaints().find("somebody else") != std::string::npos) return;
   }
 }
 
@@ -283,9 +286,7 @@ TEST_P(Drive, RefusesToBeASecondCommander) {
   }
   driving.send(SIGTERM);
   const int status = driving.finish();
-  if (driving.complaints().find("no status") != std::string::npos) {
-    GTEST_SKIP() << kNoMulticast;
-  }
+  if (status == 0) GTEST_SKIP() << kNoMulticast;
   EXPECT_EQ(status, 2);
   EXPECT_THAT(driving.complaints(), HasSubstr("somebody else commands on"));
   EXPECT_EQ(driving.output(), "");
@@ -295,7 +296,7 @@ TEST_P(Drive, StopsCommandingWhenSomebodyElseBegins) {
   Listener listener(url);
   Running fake(driver());
   Running driving(drive(configuration(arm.name)));
-  if (!listener.until([&] { return listener.states > 100; })) GTEST_SKIP() << kNoMulticast;
+  if (!listener.until([&] { return listener.states > 100; }, driving)) GTEST_SKIP() << kNoMulticast;
   command_as_well(arm, url, driving);
   EXPECT_EQ(driving.finish(), 1);
   EXPECT_THAT(driving.complaints(), HasSubstr("nothing more is sent"));
@@ -372,8 +373,9 @@ void watch(std::vector<Watched>& all) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     arms.emplace_back(kIiwa, urls[i], 1e-6, all[i].fixed);
   }
-  for (const Running& drive : drives) {
-    for (int k = 0; k < 1000 && drive.complaints().empty(); ++k) usleep(10'000);
+  for (Running& drive : drives) {
+    const auto end = Clock::now() + kHang;
+    while (drive.complaints().empty() && !drive.ended() && Clock::now() < end) usleep(10'000);
   }
   usleep(100'000);
   for (const Running& drive : drives) drive.send(SIGTERM);
@@ -423,7 +425,7 @@ TEST(DriveOfAnIiwa, RefusesSpringsOfKukas) {
   std::vector<Watched> all = {{true}, {true, "--json", stiff}, {true, "--dry-run"}, {false}};
   watch(all);
   const auto& [springs, stiffness, dry, none] = std::tie(all[0], all[1], all[2], all[3]);
-  if (springs.said.find("no status") != std::string::npos) GTEST_SKIP() << kNoMulticast;
+  if (springs.status == 0) GTEST_SKIP() << kNoMulticast;
   EXPECT_EQ(springs.status, 2);
   EXPECT_THAT(springs.said, HasSubstr("KUKA's mode Torque"));
   EXPECT_THAT(springs.said, ::testing::Not(HasSubstr("the arm is held")));
@@ -487,17 +489,19 @@ TEST(DriveOfAPanda, WaitsForTheNextDriverAfterOneThatDied) {
   const std::string url = own_url();
   const std::vector<std::string> words = {"fake-driver", scene("drivers/panda"), "--panda",
                                           "--lcm-url", url};
-  std::vector<std::string> dying = words;
-  dying.insert(dying.end(), {"--trouble", "die", "--from", "1.2"});
   Listener listener(url);
-  Running first(dying);
   Running driving({"drive", configuration("panda"), "--panda", "--json", "--lcm-url", url});
-  if (!listener.until([&] { return listener.states > 20; })) GTEST_SKIP() << kNoMulticast;
-  EXPECT_EQ(first.finish(), 1);
-  const auto says = [&](const char* what) {
-    return driving.complaints().find(what) != std::string::npos;
+  Running first(words);
+  if (!listener.until([&] { return listener.states > 20; }, driving)) {
+    GTEST_SKIP() << kNoMulticast;
+  }
+  first.send(SIGKILL);
+  EXPECT_EQ(first.finish(), 128 + SIGKILL);
+  const auto waits = [&] {  // for a driver, and has said so since the arm was held
+    const std::string said = driving.complaints(), held = "the arm is held where it is";
+    return said.find("no status on PANDA_STATUS for 2 s", said.find(held)) != std::string::npos;
   };
-  EXPECT_TRUE(listener.until([&] { return says("no status on PANDA_STATUS for 2 s"); }));
+  EXPECT_TRUE(listener.until(waits));
   Running next(words);
   EXPECT_TRUE(listener.until([&] { return listener.state.fault != 0; }));
   driving.send(SIGTERM);
@@ -519,7 +523,7 @@ TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
       {{"analysis:",  // no fault but the gap, also where a busy machine makes the loop slow
         "watchdog: {feedback: 0}\nanalysis:"}});
   Running driving({"drive", config, "--panda", "--json", "--lcm-url", url});
-  if (!listener.until([&] { return listener.states > 100; })) GTEST_SKIP() << kNoMulticast;
+  if (!listener.until([&] { return listener.states > 100; }, driving)) GTEST_SKIP() << kNoMulticast;
   const auto says = [&](const char* what) {
     return driving.complaints().find(what) != std::string::npos;
   };

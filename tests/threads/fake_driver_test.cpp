@@ -154,6 +154,13 @@ TEST(FakeDriver, DiesAsTheDriverDoes) {
   }
 }
 
+TEST(FakeDriver, DiesWhereItIsAskedTo) {
+  Running fake({"fake-driver", scene("drivers/panda"), "--panda", "--lcm-url", own_url(),
+                "--trouble", "die", "--from", "0.1"});
+  EXPECT_EQ(fake.finish(), 1);
+  EXPECT_THAT(fake.complaints(), HasSubstr("died, as asked for"));
+}
+
 TEST(FakeDriver, RefusesWhatItCannotBe) {
   struct Refusal {
     std::string said;
