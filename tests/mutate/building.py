@@ -86,6 +86,17 @@ def misfits(blamed=()):
     return known
 
 
+def without_blamed(changes, complaints):
+    """The changes that no complaint of the compiler names; the others are left out of the copy, too."""
+    blamed = set().union(*(to_blame(text, changes) for text in complaints))
+    if not blamed:
+        raise SystemExit("mutate: does not compile:\n" + "".join(complaints)[:3000])
+    misfits(blamed)
+    changes = [change for change in changes if change not in blamed]
+    copy_tree(ROOT, SOURCE, list(enumerate(changes, 1)))
+    return changes
+
+
 def without_misfits(changes, folders, commands):
     """The changes that compile in the libraries; leaves the copy of the tree as they make it."""
     known = misfits()
@@ -99,17 +110,13 @@ def without_misfits(changes, folders, commands):
     unchecked = [name for folder in folders for name in units_of(folder, commands)]
     precompiled = {os.path.relpath(word, BUILD) for name in unchecked
                    for word in commands[name] if word.endswith("cmake_pch.hxx.pch")}
-    subprocess.run(["cmake", "--build", BUILD, "--target", *precompiled],
-                   check=True, stdout=subprocess.DEVNULL)
+    while complaint := build(precompiled):
+        changes = without_blamed(changes, [complaint])
     while unchecked:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             errors = list(pool.map(lambda name: compile_errors(commands[name]), unchecked))
-        blamed = set().union(*(to_blame(text, changes) for text in errors))
-        if any(errors) and not blamed:
-            raise SystemExit("mutate: does not compile:\n" + "".join(errors)[:3000])
-        misfits(blamed)
-        changes = [change for change in changes if change not in blamed]
-        copy_tree(ROOT, SOURCE, list(enumerate(changes, 1)))
+        if any(errors):
+            changes = without_blamed(changes, errors)
         unchecked = [name for name, text in zip(unchecked, errors) if text]
     checked.touch()
     return changes
@@ -119,9 +126,8 @@ def suites_of(folders):
     return sorted({suite for folder in folders for suite in SUITES[folder]})
 
 
-def build(folders):
-    """Builds the tests; returns what the compiler complains of, empty if of nothing."""
-    targets = [f"{suite}_tests" for suite in suites_of(folders)]
+def build(targets):
+    """Builds the targets; returns what the compiler complains of, empty if of nothing."""
     command = ["cmake", "--build", BUILD, "--parallel", str(os.cpu_count()), "--target", *targets]
     with open(WORK / "build.log", "w") as log:  # changed code makes many warnings
         done = subprocess.run(command, stdout=log, stderr=subprocess.STDOUT)
@@ -136,10 +142,7 @@ def build_changed(drawn, folders, commands):
         changes = without_misfits(drawn, folders, commands)
         print(f"{len(changes)} changes ({len(drawn) - len(changes)} more do not compile)",
               flush=True)
-        errors = build(folders)
-        if not errors:
+        complaint = build(f"{suite}_tests" for suite in suites_of(folders))
+        if not complaint:
             return changes
-        blamed = to_blame(errors, changes)  # what is instantiated by tests alone
-        if not blamed:
-            raise SystemExit("mutate: the build fails:\n" + errors[:3000])
-        misfits(blamed)
+        without_blamed(changes, [complaint])  # what is instantiated by tests alone
