@@ -5,6 +5,7 @@
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
 #include <dashpot/tests/support/places.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -141,6 +142,7 @@ TEST(Run, FindsCloseModesWhereTheSampledLoopHasThem) {
 // Table 1 of the paper: 20.25, 10.98, 9.755 rad/s with 0.0255, 0.0316, 0.0294 (C1), 20.23, 10.95,
 // 11.17 with 0.2235, 0.2032, 0.2288 (C2). Its hand weighs a little more than that of the model.
 TEST(Run, ShowsTheReleasesOfThePaper) {
+  DASHPOT_SKIP_IF_QUICK();
   const auto slow_modes = [](const std::string& name) {
     Rows rows;
     const Json result = run_json(scene(name), {"--ring-down"});
