@@ -212,6 +212,18 @@ void expect_met(const Published& ours, Status status, const CertifiedEigenvalues
   EXPECT_TRUE(matching.complete()) << "some disc meets no ball of its own";
 }
 
+/// Listed by falling frequency, each once.
+void expect_ordered(const TrackedSpectrum& spectrum) {
+  const auto first = spectrum.order.begin();
+  const int count = spectrum.mode_count;
+  const auto size = [&](int i) {
+    const auto& values = spectrum.modes[static_cast<std::size_t>(i)].eigenvalues;
+    return std::sqrt(std::abs(values[0]) * std::abs(values[1]));
+  };
+  for (int k = 1; k < count; ++k) EXPECT_LE(size(first[k]), size(first[k - 1]) * (1 + 1e-6));
+  for (int k = 0; k < count; ++k) EXPECT_EQ(std::count(first, first + count, k), 1);
+}
+
 class CertifiedReferee : public ::testing::TestWithParam<PathFamily> {};
 INSTANTIATE_TEST_SUITE_P(Systems, CertifiedReferee, ::testing::ValuesIn(families()),
                          [](const auto& family) {
@@ -262,6 +274,7 @@ TEST_P(CertifiedReferee, EveryDiscMeetsABallOfItsOwn) {
                                           tracked->zero_mode_rates.begin() + zeros,
                                           [](double rate) { return std::isnan(rate); });
         expect_met(of_tracked, followed, truth, 2 * (n - zeros) + static_cast<int>(listed));
+        expect_ordered(*tracked);
       }
       if (HasFailure()) return;
       long double size = 0;
@@ -273,7 +286,9 @@ TEST_P(CertifiedReferee, EveryDiscMeetsABallOfItsOwn) {
       }
     }
   }
-  EXPECT_TRUE(!symmetric || tracker->counters().tracked > systems / 10);
+  const TrackerCounters& counters = tracker->counters();
+  EXPECT_TRUE(!symmetric || counters.tracked > systems / 10);
+  EXPECT_EQ(counters.tracked + counters.reused + counters.direct, systems);
   // Enclosures that are worth something: half of the radii are far below what anyone measures.
   std::sort(radii.begin(), radii.end());
   EXPECT_LE(radii[radii.size() / 2], 1e-9);

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <vector>
 
 namespace dashpot::analysis {
@@ -92,6 +93,26 @@ TEST_P(RandomWalk, IsFollowedWithinItsBounds) {
   // Followed, not solved directly; and the bounds are worth something.
   EXPECT_GE(follower.counters().tracked, 0.97 * 3 * steps);
   EXPECT_LE(follower.widest, 1e-3);
+}
+
+/// The check itself sees what is wrong.
+TEST(Enclosure, FindsBoundsThatAreTooSmall) {
+  System<kMaxDof> system(2);
+  system.stiffness.diagonal() << 4, 9;
+  system.damping.diagonal() << 0.1, 0.2;
+  testing::Tracked tracked;
+  ASSERT_EQ(tracked.update(system), Status::kOk);
+  const TrackedSpectrum good = *tracked.spectrum;
+  EXPECT_TRUE(testing::judge<long double>(system, good, 0).enclosed);
+  const auto broken = [&](const auto& change) {
+    const auto bad = std::make_unique<TrackedSpectrum>(good);
+    change(bad->modes[0]);
+    return !testing::judge<long double>(system, *bad, 0).enclosed;
+  };
+  EXPECT_TRUE(broken([](ModeNumbers& mode) { mode.eigenvalues[0] += 1e-10; }));
+  EXPECT_TRUE(broken([](ModeNumbers& mode) { mode.natural_frequency += 1e-10; }));
+  EXPECT_TRUE(broken([](ModeNumbers& mode) { mode.damping_ratio += 1e-10; }));
+  EXPECT_TRUE(broken([&](ModeNumbers& mode) { mode = good.modes[1]; }));
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 //   for (const Match& match : match_eigenvalues(computed_of(reference), reference.eigenvalues))
 //     EXPECT_LT(match.relative, 1e-12L);
 //
-// The truth is that of the stored doubles; how it was found and proved is told in
-// tests/data/exact.py. SI units throughout.
+// The truth is that of the stored doubles; the tests that use it have FLINT and Arb prove each
+// number. SI units throughout.
 
 #include <dashpot/tests/support/places.hpp>
 
@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <fstream>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <ostream>
 #include <stdexcept>
@@ -39,7 +40,7 @@ struct ReferenceEigenvalue {
   double re_hi = 0, re_lo = 0, im_hi = 0, im_lo = 0;
   /// How much it changes relatively, to first order, per entrywise relative change of M, C and K:
   /// what double precision can be asked for is this times 1e-16. Infinite for zero and multiple
-  /// eigenvalues, and where it is not known (responses.json).
+  /// eigenvalues.
   double condition = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] std::complex<long double> value() const {
@@ -77,13 +78,12 @@ struct ReferenceReceptance {
 /// One entry of responses.json. Everything but the free response starts from rest at t = 0.
 struct ResponseCase {
   std::string name;
-  int n = 0, r = 0;
+  int n = 0;
   /// With a jacobian the truth is that of the exact products J' K_C J and J' C_C J, of which the
   /// stored stiffness and damping are the nearest doubles; without one it is that of the stored
   /// matrices.
   Eigen::MatrixXd mass, damping, stiffness;
   std::optional<Eigen::MatrixXd> jacobian, task_stiffness, task_damping;
-  std::vector<ReferenceEigenvalue> eigenvalues;
 
   Eigen::VectorXd initial_position, initial_velocity;
   Trajectory free;
@@ -117,88 +117,17 @@ namespace detail {
 
 using Json = nlohmann::json;
 
-inline const Json& member(const Json& object, const char* key) {
-  const auto found = object.find(key);
-  if (found == object.end()) throw std::runtime_error(std::string("missing key '") + key + "'");
-  return *found;
-}
-
-template <class T>
-T get(const Json& object, const char* key) {
-  try {
-    return member(object, key).get<T>();
-  } catch (const Json::exception& error) {
-    throw std::runtime_error(std::string("key '") + key + "': " + error.what());
-  }
-}
-
-inline Eigen::VectorXd get_vector(const Json& object, const char* key) {
-  const auto values = get<std::vector<double>>(object, key);
+inline Eigen::VectorXd to_vector(const Json& numbers) {
+  const auto values = numbers.get<std::vector<double>>();
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-/// Rows of equal length; columns_if_empty gives the shape of a matrix without rows.
-inline Eigen::MatrixXd get_matrix(const Json& object, const char* key,
-                                  Eigen::Index columns_if_empty = 0) {
-  const auto rows = get<std::vector<std::vector<double>>>(object, key);
-  const auto columns =
-      rows.empty() ? columns_if_empty : static_cast<Eigen::Index>(rows.front().size());
+/// `columns` gives the shape of a matrix without rows.
+inline Eigen::MatrixXd to_matrix(const Json& rows, Eigen::Index columns) {
   Eigen::MatrixXd result(static_cast<Eigen::Index>(rows.size()), columns);
-  for (Eigen::Index i = 0; i < result.rows(); ++i) {
-    const auto& row = rows[static_cast<std::size_t>(i)];
-    if (static_cast<Eigen::Index>(row.size()) != columns)
-      throw std::runtime_error(std::string("key '") + key + "': rows of unequal length");
-    for (Eigen::Index j = 0; j < columns; ++j) result(i, j) = row[static_cast<std::size_t>(j)];
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    result.row(static_cast<Eigen::Index>(i)) = to_vector(rows[i]).transpose();
   }
-  return result;
-}
-
-inline Eigen::MatrixXd get_square(const Json& object, const char* key, int n) {
-  Eigen::MatrixXd result = get_matrix(object, key);
-  if (result.rows() != n || result.cols() != n)
-    throw std::runtime_error(std::string("key '") + key + "': not " + std::to_string(n) + " x " +
-                             std::to_string(n));
-  return result;
-}
-
-inline std::optional<Eigen::MatrixXd> get_optional_matrix(const Json& object, const char* key) {
-  if (!object.contains(key)) return std::nullopt;
-  return get_matrix(object, key);
-}
-
-inline std::vector<ReferenceEigenvalue> get_eigenvalues(const Json& object, int n) {
-  const auto values = get<std::vector<std::vector<std::vector<double>>>>(object, "eigenvalues");
-  if (values.size() != 2 * static_cast<std::size_t>(n))
-    throw std::runtime_error("key 'eigenvalues': not 2n of them");
-  std::vector<ReferenceEigenvalue> result;
-  for (const auto& z : values) {
-    if (z.size() != 2 || z[0].size() != 2 || z[1].size() != 2)
-      throw std::runtime_error("key 'eigenvalues': not [[re_hi, re_lo], [im_hi, im_lo]]");
-    ReferenceEigenvalue eigenvalue;
-    eigenvalue.re_hi = z[0][0];
-    eigenvalue.re_lo = z[0][1];
-    eigenvalue.im_hi = z[1][0];
-    eigenvalue.im_lo = z[1][1];
-    result.push_back(eigenvalue);
-  }
-  if (object.contains("conditions")) {
-    const Json& conditions = member(object, "conditions");
-    if (conditions.size() != result.size())
-      throw std::runtime_error("key 'conditions': not 2n of them");
-    for (std::size_t k = 0; k < result.size(); ++k)
-      if (!conditions[k].is_null()) result[k].condition = conditions[k].get<double>();
-  }
-  return result;
-}
-
-inline Trajectory get_trajectory(const Json& object, int n) {
-  Trajectory result{get<std::vector<double>>(object, "times"),
-                    get_matrix(object, "position").transpose(),
-                    get_matrix(object, "velocity").transpose()};
-  const auto count = static_cast<Eigen::Index>(result.times.size());
-  for (const auto* part : {&result.position, &result.velocity})
-    if (part->rows() != n || part->cols() != count)
-      throw std::runtime_error("trajectory: not n values a time");
   return result;
 }
 
@@ -206,50 +135,63 @@ inline Trajectory get_trajectory(const Json& object, int n) {
 template <class Case>
 Case to_case(const Json& j) {
   Case c;
-  c.name = get<std::string>(j, "name");
-  c.n = get<int>(j, "n");
-  c.r = get<int>(j, "r");
-  c.mass = get_square(j, "mass", c.n);
-  c.damping = get_square(j, "damping", c.n);
-  c.stiffness = get_square(j, "stiffness", c.n);
-  c.eigenvalues = get_eigenvalues(j, c.n);
+  c.name = j.at("name");
+  c.n = j.at("n");
+  c.mass = to_matrix(j.at("mass"), c.n);
+  c.damping = to_matrix(j.at("damping"), c.n);
+  c.stiffness = to_matrix(j.at("stiffness"), c.n);
   return c;
 }
 
 inline SpectrumCase to_spectrum_case(const Json& j) {
   auto c = to_case<SpectrumCase>(j);
-  if (j.contains("stiffness_factor")) c.stiffness_factor = get_matrix(j, "stiffness_factor", c.n);
+  c.r = j.at("r");
+  const Json &values = j.at("eigenvalues"), &conditions = j.at("conditions");
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const Json &re = values[k].at(0), &im = values[k].at(1);
+    c.eigenvalues.push_back({re.at(0), re.at(1), im.at(0), im.at(1)});
+    if (!conditions.at(k).is_null()) c.eigenvalues.back().condition = conditions[k];
+  }
+  if (j.contains("stiffness_factor")) {
+    c.stiffness_factor = to_matrix(j["stiffness_factor"], c.n);
+  }
   return c;
 }
 
 inline ResponseCase to_response_case(const Json& j) {
   auto c = to_case<ResponseCase>(j);
-  c.jacobian = get_optional_matrix(j, "jacobian");
-  c.task_stiffness = get_optional_matrix(j, "task_stiffness");
-  c.task_damping = get_optional_matrix(j, "task_damping");
-  const Json& free = member(j, "free");
-  c.initial_position = get_vector(free, "initial_position");
-  c.initial_velocity = get_vector(free, "initial_velocity");
-  c.free = get_trajectory(free, c.n);
-  const Json& impulse = member(j, "impulse");
-  c.impulse = get_vector(impulse, "impulse");
-  c.impulse_response = get_trajectory(impulse, c.n);
-  const Json& step = member(j, "constant_force");
-  c.constant_force = get_vector(step, "force");
-  c.step_response = get_trajectory(step, c.n);
-  const Json& harmonic = member(j, "harmonic");
-  c.harmonic_cosine = get_vector(harmonic, "cosine");
-  c.harmonic_sine = get_vector(harmonic, "sine");
-  c.harmonic_frequency = get<double>(harmonic, "frequency");
-  c.harmonic_response = get_trajectory(harmonic, c.n);
-  const Json& sampled = member(j, "sampled");
-  c.sample_step = get<double>(sampled, "step");
-  c.samples = get_matrix(sampled, "samples").transpose();
-  c.sampled_response = get_trajectory(sampled, c.n);
-  for (const Json& entry : member(j, "receptance")) {
-    ReferenceReceptance g{get<double>(entry, "frequency"), Eigen::MatrixXcd(c.n, c.n)};
-    g.value.real() = get_square(entry, "real", c.n);
-    g.value.imag() = get_square(entry, "imag", c.n);
+  if (j.contains("jacobian")) {
+    c.jacobian = to_matrix(j["jacobian"], c.n);
+    c.task_stiffness = to_matrix(j.at("task_stiffness"), c.jacobian->rows());
+    c.task_damping = to_matrix(j.at("task_damping"), c.jacobian->rows());
+  }
+  const auto trajectory = [&](const Json& given) {
+    return Trajectory{given.at("times"), to_matrix(given.at("position"), c.n).transpose(),
+                      to_matrix(given.at("velocity"), c.n).transpose()};
+  };
+  const Json& free = j.at("free");
+  c.initial_position = to_vector(free.at("initial_position"));
+  c.initial_velocity = to_vector(free.at("initial_velocity"));
+  c.free = trajectory(free);
+  const Json& impulse = j.at("impulse");
+  c.impulse = to_vector(impulse.at("impulse"));
+  c.impulse_response = trajectory(impulse);
+  const Json& step = j.at("constant_force");
+  c.constant_force = to_vector(step.at("force"));
+  c.step_response = trajectory(step);
+  const Json& harmonic = j.at("harmonic");
+  c.harmonic_cosine = to_vector(harmonic.at("cosine"));
+  c.harmonic_sine = to_vector(harmonic.at("sine"));
+  c.harmonic_frequency = harmonic.at("frequency");
+  c.harmonic_response = trajectory(harmonic);
+  const Json& sampled = j.at("sampled");
+  c.sample_step = sampled.at("step");
+  c.samples = to_matrix(sampled.at("samples"), c.n).transpose();
+  c.sampled_response = trajectory(sampled);
+  for (const Json& entry : j.at("receptance")) {
+    ReferenceReceptance g{entry.at("frequency"), Eigen::MatrixXcd(c.n, c.n)};
+    g.value.real() = to_matrix(entry.at("real"), c.n);
+    g.value.imag() = to_matrix(entry.at("imag"), c.n);
     c.receptance.push_back(std::move(g));
   }
   return c;
@@ -270,7 +212,7 @@ class Systems {
       lines_.push_back(std::move(line));
     }
     if (names_.empty()) {
-      throw std::runtime_error(path_ + ": no systems in it (tests/data/make_oracle.py writes it)");
+      throw std::runtime_error(path_ + ": no systems in it");
     }
   }
 
@@ -346,62 +288,25 @@ struct Match {
   long double relative = 0;   ///< as relative_distance
 };
 
-/// Pairs each computed eigenvalue with a reference one so that the sum of the relative distances is
-/// least (Hungarian method, so clusters and multiple eigenvalues are paired one to one). Result k
-/// belongs to computed[k]. Throws if the lists differ in length.
+/// Pairs each computed eigenvalue with the nearest reference one that is left. Result k belongs to
+/// computed[k]. Throws if the lists differ in length.
 inline std::vector<Match> match_eigenvalues(const std::vector<std::complex<double>>& computed,
                                             const std::vector<ReferenceEigenvalue>& reference) {
-  const std::size_t n = computed.size();
-  if (reference.size() != n)
-    throw std::invalid_argument("match_eigenvalues: " + std::to_string(n) + " computed, " +
-                                std::to_string(reference.size()) + " reference eigenvalues");
-  // Rows and columns count from 1; column 0 holds the row being placed. row_of[j] is the row placed
-  // in column j.
-  std::vector<long double> row_price(n + 1, 0), column_price(n + 1, 0);
-  std::vector<std::size_t> row_of(n + 1, 0), previous(n + 1, 0);
-  for (std::size_t row = 1; row <= n; ++row) {
-    std::vector<long double> slack(n + 1, std::numeric_limits<long double>::infinity());
-    std::vector<bool> visited(n + 1, false);
-    std::size_t column = 0;
-    row_of[0] = row;
-    do {
-      visited[column] = true;
-      const std::size_t current = row_of[column];
-      long double step = std::numeric_limits<long double>::infinity();
-      std::size_t next = 0;
-      for (std::size_t j = 1; j <= n; ++j) {
-        if (visited[j]) continue;
-        const long double reduced = relative_distance(computed[current - 1], reference[j - 1]) -
-                                    row_price[current] - column_price[j];
-        if (reduced < slack[j]) {
-          slack[j] = reduced;
-          previous[j] = column;
-        }
-        if (slack[j] < step) {
-          step = slack[j];
-          next = j;
-        }
-      }
-      for (std::size_t j = 0; j <= n; ++j) {
-        if (visited[j]) {
-          row_price[row_of[j]] += step;
-          column_price[j] -= step;
-        } else {
-          slack[j] -= step;
-        }
-      }
-      column = next;
-    } while (row_of[column] != 0);
-    while (column != 0) {
-      row_of[column] = row_of[previous[column]];
-      column = previous[column];
-    }
+  if (reference.size() != computed.size()) {
+    throw std::invalid_argument("match_eigenvalues: " + std::to_string(computed.size()) +
+                                " computed, " + std::to_string(reference.size()) +
+                                " reference eigenvalues");
   }
-  std::vector<Match> matches(n);
-  for (std::size_t j = 1; j <= n; ++j) {
-    const std::size_t i = row_of[j] - 1;
-    matches[i] = {j - 1, distance(computed[i], reference[j - 1]),
-                  relative_distance(computed[i], reference[j - 1])};
+  std::vector<std::size_t> left(reference.size());
+  std::iota(left.begin(), left.end(), 0U);
+  std::vector<Match> matches;
+  for (const std::complex<double>& value : computed) {
+    const auto nearest = std::min_element(left.begin(), left.end(), [&](auto a, auto b) {
+      return distance(value, reference[a]) < distance(value, reference[b]);
+    });
+    const ReferenceEigenvalue& z = reference[*nearest];
+    matches.push_back({*nearest, distance(value, z), relative_distance(value, z)});
+    left.erase(nearest);
   }
   return matches;
 }
