@@ -37,19 +37,6 @@ VectorXd end_of(const MatrixXd& grid) {
   return grid.rightCols(tenth).rowwise().mean();
 }
 
-/// Where the motion about its end is lost in noise, in samples of the grid.
-Index audible(const MatrixXd& grid, const VectorXd& noise) {
-  const MatrixXd y = noise.cwiseInverse().asDiagonal() * (grid.colwise() - end_of(grid));
-  const Index window = std::max<Index>(1, grid.cols() / 50);
-  const double samples = static_cast<double>(window * grid.rows());
-  const double least = 1.5 + 5 * std::sqrt(2 / samples);
-  Index last = 0;
-  for (Index at = 0; at + window <= grid.cols(); at += window) {
-    if (y.middleCols(at, window).squaredNorm() / samples > least) last = at + window;
-  }
-  return std::max(last, std::min<Index>(grid.cols(), 20));
-}
-
 /// The noise of evenly spaced samples by the least singular values of their Hankel matrix: motion
 /// that is predictable from sample to sample leaves them alone, however far apart samples are.
 double unpredictable(const MotionRecord& record, Index channel) {
@@ -72,6 +59,18 @@ double unpredictable(const MotionRecord& record, Index channel) {
 }
 
 }  // namespace
+
+Index audible(const MatrixXd& grid, const VectorXd& noise) {
+  const MatrixXd y = noise.cwiseInverse().asDiagonal() * (grid.colwise() - end_of(grid));
+  const Index window = std::max<Index>(1, grid.cols() / 50);
+  const double samples = static_cast<double>(window * grid.rows());
+  const double least = 1.5 + 5 * std::sqrt(2 / samples);
+  Index last = 0;
+  for (Index at = 0; at + window <= grid.cols(); at += window) {
+    if (y.middleCols(at, window).squaredNorm() / samples > least) last = at + window;
+  }
+  return std::max(last, std::min<Index>(grid.cols(), 20));
+}
 
 double typical_step(const std::vector<MotionRecord>& records) {
   std::vector<double> steps;

@@ -15,6 +15,9 @@ double typical_step(const std::vector<MotionRecord>& records);
 /// each point.
 Eigen::MatrixXd on_grid(const MotionRecord& record, double step, Eigen::MatrixXd* widths = nullptr);
 
+/// Where the motion of channels x points about their end is lost in noise.
+Eigen::Index audible(const Eigen::MatrixXd& grid, const Eigen::VectorXd& noise);
+
 /// Records in few evenly spaced cells, each the mean of the samples in a stretch of time: a sum of
 /// decays stays one, with the same eigenvalues, and the noise falls.
 class DecayCells {

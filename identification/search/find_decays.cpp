@@ -4,6 +4,7 @@
 #include <dashpot/identification/records/steady_lines.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -22,10 +23,12 @@ constexpr double kRise = 3;    // a new push
 // In periods of the motion's pace: what is slower by a few times still has one envelope.
 constexpr double kStandstill = 1;  // within a motion
 constexpr double kEnvelope = 1.5;  // window
-constexpr double kLag = 0.025;     // of differences
-constexpr Index kLeast = 20;       // samples of a decay
+// Of differences: the first that shows a push. Short ones are those of fast motion, long ones stand
+// out of more noise.
+constexpr std::array kLags = {0.025, 0.1};
+constexpr Index kLeast = 20;  // samples of a decay
 
-/// How fast the channels move: root mean square of differences over kLag, in units of their noise.
+/// How fast the channels move: root mean square of differences over `lag`, in units of their noise.
 VectorXd speed_of(const MatrixXd& grid, const VectorXd& noise, Index lag) {
   const Index N = grid.cols();
   VectorXd squares = VectorXd::Zero(N);
@@ -122,11 +125,6 @@ std::vector<Event> find_events(const VectorXd& speed, double period) {
     }
     const std::size_t before = events.size();
     add_events(speed, k, last + 1, points(kEnvelope), events);
-    // What is at rest afterwards shows where the arm rests.
-    Index quiet = last + 1;
-    const Index most = last + 1 + (last + 1 - events.back().begin) / 3;
-    while (quiet < std::min(N, most) && speed[quiet] <= kMoves) ++quiet;
-    events.back().end = quiet;
     events.erase(
         std::remove_if(events.begin() + static_cast<std::ptrdiff_t>(before), events.end(),
                        [&speed](const Event& event) { return speed[event.peak] < kStrong; }),
@@ -134,6 +132,17 @@ std::vector<Event> find_events(const VectorXd& speed, double period) {
     k = last + 1;
   }
   return events;
+}
+
+/// Slow motion goes on where its speed is lost in noise, and what is at rest afterwards shows where
+/// the arm rests: ends each event by its positions, before the next one.
+void extend(const MatrixXd& grid, const VectorXd& noise, std::vector<Event>& events) {
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    auto& [begin, peak, end] = events[i];
+    const Index next = i + 1 < events.size() ? events[i + 1].begin : grid.cols();
+    const Index heard = audible(grid.middleCols(begin, next - begin), noise);
+    end = std::max(end, std::min(next, begin + heard + heard / 3));
+  }
 }
 
 /// Returns the standard deviation of each channel.
@@ -166,7 +175,8 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
   starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
   // Large motions are not linear, but what decays fast is seen in them only.
   constexpr double kEnough = 1e-3, kMore = 0.03, kSeen = 20;
-  const VectorXd enough = kEnough * motion_of(part_of(record, from, to));
+  // Digits that do not change are no motion without noise.
+  const VectorXd enough = (kEnough * motion_of(part_of(record, from, to))).cwiseMax(noise);
   // Mean logarithm of what a model leaves over from a start on; none where too little follows.
   const auto rest = [&](Index start) {
     if (to - start < kLeast) return std::numeric_limits<double>::infinity();
@@ -214,14 +224,21 @@ std::vector<FreeDecay> find_decays(const MotionRecord& record, const std::vector
   const double pace = pace_of(grid, step, noise);
   if (!(pace > 0)) return {};
   const double period = 2 * std::numbers::pi / (pace * step);
-  const Index lag = std::max<Index>(1, static_cast<Index>(std::lround(kLag * period)));
+  Index lag = 1;
+  std::vector<Event> events;
+  for (const double share : kLags) {
+    if (!events.empty()) break;
+    lag = std::max<Index>(1, static_cast<Index>(std::lround(share * period)));
+    events = find_events(speed_of(grid, noise, lag), period);
+  }
   std::vector<FreeDecay> decays;
   const auto sample_at = [&record, step](Index point) {
     const double t = record.time[0] + (static_cast<double>(point) - 0.5) * step;
     const auto* const first = record.time.data();
     return static_cast<Index>(std::lower_bound(first, first + record.time.size(), t) - first);
   };
-  for (const Event& event : find_events(speed_of(grid, noise, lag), period)) {
+  extend(grid, noise, events);
+  for (const Event& event : events) {
     if (event.end - event.begin < 4 * lag) continue;
     const auto whole = grid.middleCols(event.begin, event.end - event.begin);
     const VectorXd size =
