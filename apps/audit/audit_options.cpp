@@ -1,7 +1,11 @@
+#include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/apps/audit/audit_options.hpp>
 #include <dashpot/apps/audit/presets.hpp>
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/config/config_gains.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
@@ -186,6 +190,11 @@ AuditTask read_task(const AuditCommand& command) {
   AuditOptions& audit = task.options;
   read_gains(command, task.model, audit, task.intended_ratio);
   if (!audit.inertia_blocks) warn_of(task.model, audit.gains.task_stiffness);
+  if (const auto negative = analysis::negative_eigenvalues(audit.gains.task_damping);
+      negative.size() > 0) {
+    print_error("warning: the task's damping has the eigenvalue " + format_number(negative[0], 4) +
+                ": it feeds energy in");
+  }
   static_cast<controller::LoopTiming&>(audit) = command.timing;
   if (command.no_margin) audit.period = 0;
   audit.margin = command.margin;

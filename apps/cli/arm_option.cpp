@@ -176,7 +176,12 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
 void add_loop_options(CLI::App& command, controller::LoopTiming& timing) {
   command
       .add_option("--delay", timing.delay, "Ticks from a command to its effect, beyond the hold")
-      ->check(CLI::Range(0, 100))
+      ->check([](const std::string& text) -> std::string {
+        const bool whole = text.find_first_not_of("0123456789") == std::string::npos;
+        return whole && text.size() < 4 && std::stoi(text) <= 100
+                   ? ""
+                   : "a whole number of ticks from 0 to 100 is wanted, not '" + text + "'";
+      })
       ->option_text("N (0)");
   command.add_option("--cutoff", timing.cutoff, "Of a low-pass on the torque; 0: none")
       ->transform(quantity("Hz", 0, std::numeric_limits<double>::max(), "a frequency in Hz"))

@@ -135,8 +135,8 @@ CLI::Validator positive(const std::string& unit, const std::string& what) {
 }
 
 CLI::Validator control_period() {
-  constexpr double kLongest = 1;  // s, beyond what any arm is controlled with
-  return quantity("s", std::numeric_limits<double>::min(), kLongest, "a period up to 1 s");
+  constexpr double kLongest = 0.1;  // s, beyond what any arm is controlled with
+  return quantity("s", std::numeric_limits<double>::min(), kLongest, "a period up to 0.1 s");
 }
 
 }  // namespace dashpot::apps

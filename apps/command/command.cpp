@@ -66,6 +66,9 @@ void take_gains(const CommandOptions& options, std::size_t n, command_t& command
     }
     for (std::size_t i = 0; i < 6; ++i) command.directions[i] = command.task_stiffness[i][i] > 0;
   }
+  if (options.damping_ratio && !options.damping.empty()) {
+    throw InputError("--damping-ratio", "stands beside --damping; one of them is wanted");
+  }
   if (options.damping_ratio) {
     command.parts |= command_t::TASK_RATIO;
     command.task_damping_ratio = *options.damping_ratio;
@@ -112,6 +115,10 @@ command_t make_command(const CommandOptions& options, const state_t& state) {
   command.joint_damping = command.joint_stiffness;
   command.null_stiffness.assign(n, 0);
   command.null_damping.assign(n, 0);
+  const bool pose = !options.tip_position.empty() || !options.tip_quaternion.empty();
+  if (options.mode == "joint" && pose) {
+    throw InputError("--mode", "joint has no goal of the tip; cartesian has");
+  }
   if (!options.mode.empty()) {
     command.parts |= command_t::MODE;
     command.mode = options.mode == "joint" ? command_t::JOINT : command_t::CARTESIAN;
@@ -121,7 +128,7 @@ command_t make_command(const CommandOptions& options, const state_t& state) {
     take("--joint-position", options.joint_position, controller::Units(n, "rad"),
          command.joint_position);
   }
-  if (!options.tip_position.empty() || !options.tip_quaternion.empty()) {
+  if (pose) {
     command.parts |= command_t::TIP_POSE;  // what is not given stays where the springs are fixed
     std::copy_n(state.reference_tip_position, 3, command.tip_position);
     std::copy_n(state.reference_tip_quaternion, 4, command.tip_quaternion);

@@ -255,6 +255,14 @@ void run_inspect(const InspectOptions& options) {
   const RobotModel model = read_model(options);
   const JointVector q = options.posture.read(model);
   const JointVector qd = joint_list("--qd", options.qd, model, "rad/s", "m/s");
+  for (int i = 0; i < model.dof(); ++i) {
+    const controller::Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    if (joint.velocity > 0 && std::abs(qd[i]) > joint.velocity) {
+      print_error("warning: --qd: joint '" + joint.name + "' is faster than its limit, " +
+                  format_number(joint.velocity, 4) +
+                  "; degrees a second are written as '30 deg/s'");
+    }
+  }
   const DynamicsResult dynamics = controller::evaluate(model, q, qd);
   warn_of(model);
   print(options.json ? to_json(options, model, dynamics, q)

@@ -61,9 +61,7 @@ void read_faults(const YamlMapping& scenario, const Units& positions, Scene& sce
   for (const YamlMapping& keys : mappings(scenario, "faults", kKeys)) {
     require(keys, "begin", scenario, "faults");
     sim::SensorFault sensors;
-    read_number(keys, "begin", "s", kNotNegative, sensors.begin);
-    read_number(keys, "end", "s", kPositive, sensors.end);
-    if (sensors.end <= sensors.begin) throw keys.error("end", "is not after begin");
+    read_when(keys, scene, sensors.begin, sensors.end);
     LoopFault loop{sensors.begin, sensors.end, 1, {}};
     const bool wrong_sensors = read_sensor_fault(keys, positions, sensors);
     const bool wrong_loop = read_loop_fault(keys, positions, loop);

@@ -42,6 +42,9 @@ void read_faults(const controller::YamlMapping& scenario, const controller::Unit
 std::vector<controller::YamlMapping> mappings(const controller::YamlMapping& keys,
                                               std::string_view key,
                                               std::span<const std::string_view> known_keys);
+/// Reads `begin` and `end` of what happens in a scenario; an end that is missing stays as it is.
+/// Throws InputError for an end that is not after the begin, and a begin after the scenario.
+void read_when(const controller::YamlMapping& keys, const Scene& scene, double& begin, double& end);
 /// Throws unless `keys` has `key`; `parent` has `keys` under `name`.
 void require(const controller::YamlMapping& keys, std::string_view key,
              const controller::YamlMapping& parent, std::string_view name);

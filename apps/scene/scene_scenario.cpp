@@ -5,9 +5,11 @@
 #include <dashpot/controller/config/config_gains.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/posture.hpp>
 
 #include <algorithm>
 #include <limits>
+#include <numbers>
 
 namespace dashpot::apps {
 namespace {
@@ -43,6 +45,8 @@ void check_limits(const YamlMapping& keys, std::string_view key, const JointVect
   const controller::Limits& limits = scene.arm->config.settings.limits;
   for (int i = 0; i < scene.dof(); ++i) {
     if (q[i] >= limits.position_lower[i] && q[i] <= limits.position_upper[i]) continue;
+    const std::string said = controller::outside_limits(scene.arm->config.model, q);
+    if (!said.empty()) throw keys.error(key, said);
     throw keys.error(key, "joint " + std::to_string(i + 1) + " would be at " +
                               std::to_string(q[i]) + " " + positions[static_cast<std::size_t>(i)] +
                               ", outside its limits");
@@ -101,6 +105,11 @@ void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& 
   if (keys.has("tip_displacement")) {
     Eigen::VectorXd displacement = Eigen::VectorXd::Zero(6);
     read_numbers(keys, "tip_displacement", kTaskUnits, kAnyNumber, displacement);
+    if (displacement.tail(3).norm() > std::numbers::pi) {
+      throw keys.error("tip_displacement",
+                       "turns by more than half a turn, in rad; degrees are "
+                       "written as '5 deg'");
+    }
     const auto q = displaced(scene.arm->config.model, scene.rest, displacement);
     if (!q) {
       const TipGoal goal{moved(tip_at(scene.arm->config.model, scene.rest), displacement)};
@@ -133,20 +142,19 @@ void read_system_start(const YamlMapping& scenario, const Units& positions, Scen
 
 /// When a push begins and ends.
 template <class Value>
-sim::Piece<Value> read_times(const YamlMapping& keys, const YamlMapping& scenario) {
+sim::Piece<Value> read_times(const YamlMapping& keys, const YamlMapping& scenario,
+                             const Scene& scene) {
   sim::Piece<Value> piece;
   require(keys, "begin", scenario, "pushes");
   require(keys, "end", scenario, "pushes");
-  read_number(keys, "begin", "s", kNotNegative, piece.begin);
-  read_number(keys, "end", "s", kPositive, piece.end);
-  if (piece.end <= piece.begin) throw keys.error("end", "is not after begin");
+  read_when(keys, scene, piece.begin, piece.end);
   return piece;
 }
 
 void read_arm_pushes(const YamlMapping& scenario, Scene& scene) {
   static constexpr std::array<std::string_view, 3> kKeys = {"begin", "end", "wrench"};
   for (const YamlMapping& keys : mappings(scenario, "pushes", kKeys)) {
-    auto piece = read_times<sim::Vector6>(keys, scenario);
+    auto piece = read_times<sim::Vector6>(keys, scenario, scene);
     require(keys, "wrench", scenario, "pushes");
     read_numbers(keys, "wrench", kWrenchUnits, kAnyNumber, piece.value);
     scene.arm->options.wrenches.push_back(piece);
@@ -156,7 +164,7 @@ void read_arm_pushes(const YamlMapping& scenario, Scene& scene) {
 void read_system_pushes(const YamlMapping& scenario, const Units& positions, Scene& scene) {
   static constexpr std::array<std::string_view, 3> kKeys = {"begin", "end", "force"};
   for (const YamlMapping& keys : mappings(scenario, "pushes", kKeys)) {
-    auto piece = read_times<JointVector>(keys, scenario);
+    auto piece = read_times<JointVector>(keys, scenario, scene);
     require(keys, "force", scenario, "pushes");
     piece.value = JointVector::Zero(scene.dof());
     read_numbers(keys, "force", Units(positions.size(), "N"), kAnyNumber, piece.value);
@@ -173,9 +181,7 @@ void read_loads(const YamlMapping& scenario, Scene& scene) {
     piece.end = std::numeric_limits<double>::infinity();
     require(keys, "begin", scenario, "loads");
     require(keys, "mass", scenario, "loads");
-    read_number(keys, "begin", "s", kNotNegative, piece.begin);
-    read_number(keys, "end", "s", kPositive, piece.end);
-    if (piece.end <= piece.begin) throw keys.error("end", "is not after begin");
+    read_when(keys, scene, piece.begin, piece.end);
     read_body(keys, piece.value.mass, piece.value.center, piece.value.about_center);
     scene.arm->options.loads.push_back(piece);
   }
@@ -244,6 +250,13 @@ std::vector<YamlMapping> mappings(const YamlMapping& keys, std::string_view key,
                         known_keys);
   }
   return result;
+}
+
+void read_when(const YamlMapping& keys, const Scene& scene, double& begin, double& end) {
+  read_number(keys, "begin", "s", kNotNegative, begin);
+  read_number(keys, "end", "s", kPositive, end);
+  if (end <= begin) throw keys.error("end", "is not after begin");
+  if (begin > scene.duration) throw keys.error("begin", "is after the end of the scenario");
 }
 
 void require(const YamlMapping& keys, std::string_view key, const YamlMapping& parent,

@@ -14,6 +14,9 @@ void read_payload(const YamlMapping& robot, Payload& payload) {
   read_number(keys, "mass", "kg", kNotNegative, payload.mass);
   read_vector3(keys, "center", "m", payload.center);
   read_matrix(keys, "inertia", Units(3, "kg m^2"), payload.inertia);
+  if (payload.mass == 0 && !(payload.center.isZero(0) && payload.inertia.isZero(0))) {
+    throw robot.error("payload", "has a centre or inertia, and no mass");
+  }
 }
 
 void read_tool(const YamlMapping& robot, Pose& tool) {

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace dashpot::controller {
 namespace {
@@ -101,15 +102,15 @@ void doubt_inertias(const RobotModel& model, const std::vector<MovedLink>& links
   }
 }
 
-/// Returns the middle one of the sizes that the links' masses and inertias have, m; 0 of fewer than
-/// three links.
+/// Returns the middle one of the sizes that the links' masses and inertias have, m; a negative
+/// number of fewer than three links.
 double middle_size(const std::vector<MovedLink>& links) {
   std::vector<double> sizes;
   for (const MovedLink& link : links) {
     const double mass = link.body.body.getMass();
     if (mass > 0) sizes.push_back(std::sqrt(link.body.moment / mass));
   }
-  if (sizes.size() < 3) return 0;
+  if (sizes.size() < 3) return -1;
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
   return *middle;
@@ -120,6 +121,7 @@ void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, d
                  std::vector<std::string>& warnings) {
   constexpr double kArm = 0.5;     // m: a smaller arm may carry things as large as this
   constexpr double kMiddle = 0.5;  // of the reach; links have a tenth of it
+  constexpr double kLeast = 1e-3;  // likewise
   const std::string beside = " m, the arm reaches " + figure(reach) + " m: ";
   const auto doubt = [&](const std::string& what, double size, const char* question) {
     if (size > std::max(reach, kArm)) warnings.push_back(what + figure(size) + beside + question);
@@ -134,7 +136,8 @@ void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, d
     doubt("payload: its mass and inertia are those of a body of ",
           std::sqrt(0.5 * payload.inertia.trace() / payload.mass), "is its inertia in kg m^2?");
   }
-  if (const double size = middle_size(links); size > kMiddle * reach) {
+  const double size = middle_size(links);
+  if (size > kMiddle * reach || (size >= 0 && size < kLeast * reach)) {
     warnings.push_back("links: their masses and inertias are those of bodies of " + figure(size) +
                        beside + "are inertias in kg m^2?");
   }
@@ -144,28 +147,44 @@ void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, d
 void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, double reach,
                   std::vector<std::string>& warnings) {
   constexpr double kTurn = 30;      // rad: five turns, as cables allow
-  constexpr double kSpeed = 50;     // rad/s
-  constexpr double kNoLimit = 1e4;  // rad, rad/s: written where there is none
+  constexpr double kSpeed = 20;     // rad/s: twice that of the fastest arms
+  constexpr double kEffort = 1e4;   // N m
+  constexpr int kArm = 4;           // joints that make an arm
+  constexpr double kNoLimit = 1e6;  // written where there is none
+  constexpr double kRotors = 0.1;   // of the mass at the reach: five times the published ones
+  constexpr double kBare = 2e-4;    // kg m^2, of a motor without its gear, in an arm that weighs
+  constexpr double kHeavy = 5;      // kg
   double mass = model.attachment().mass;
   for (const MovedLink& link : links) mass += link.body.body.getMass();
-  const auto doubtful = [](double limit, double most) { return limit > most && limit < kNoLimit; };
+  const auto doubt = [&](const Joint& joint, const std::string& what) {
+    warnings.push_back(one_line("joint '" + joint.name + "': its " + what));
+  };
+  const auto limit = [&](const Joint& joint, double value, double most, const std::string& what) {
+    if (value > most && value < kNoLimit) doubt(joint, "limit of " + what);
+  };
+  const double least = model.joint_values(&Joint::effort).minCoeff();
+  if (model.dof() >= kArm && least == std::numeric_limits<double>::infinity()) {
+    warnings.emplace_back(
+        "joints: none has a limit of effort (0 is none): limits.torque is 100 N m");
+  }
   for (const Joint& joint : model.joints()) {
     if (joint.type == JointType::kPrismatic) continue;
-    const std::string name = "joint '" + joint.name + "': ";
-    if (mass > 0 && joint.reflected_inertia > mass * std::max(1.0, reach * reach)) {
-      warnings.push_back(one_line(
-          name + "its reflected inertia, " + figure(joint.reflected_inertia) +
-          " kg m^2, is more than that of the whole arm, " + figure(mass) + " kg, at its reach, " +
-          figure(reach) + " m: is it in kg m^2, and seen by the joint?"));
+    const double rotor = joint.reflected_inertia;
+    const bool large = mass > 0 && rotor > kRotors * mass * std::max(1.0, reach * reach);
+    if (large || (rotor > 0 && rotor < kBare && mass > kHeavy)) {
+      doubt(joint, "reflected inertia, " + figure(rotor) + " kg m^2, is hardly one of an arm of " +
+                       figure(mass) + " kg, " + figure(reach) + " m long: is it " +
+                       (large ? "in kg m^2?"
+                              : "that of the motor, to be multiplied by the gear ratio's square?"));
     }
-    if (doubtful(std::max(-joint.lower, joint.upper), kTurn)) {
-      warnings.push_back(one_line(name + "its limits of position, " + figure(joint.lower) + " to " +
-                                  figure(joint.upper) + " rad, are many turns: are they in deg?"));
-    }
-    if (doubtful(joint.velocity, kSpeed)) {
-      warnings.push_back(one_line(name + "its limit of velocity, " + figure(joint.velocity) +
-                                  " rad/s, is hardly one of an arm: is it in deg/s?"));
-    }
+    limit(joint, std::max(-joint.lower, joint.upper), kTurn,
+          "position, " + figure(joint.lower) + " to " + figure(joint.upper) +
+              " rad, is many turns: is it in deg?");
+    limit(joint, joint.velocity, kSpeed,
+          "velocity, " + figure(joint.velocity) +
+              " rad/s, is hardly one of an arm: is it in deg/s or rpm?");
+    limit(joint, joint.effort, kEffort,
+          "effort, " + figure(joint.effort) + " N m, is hardly one of an arm: is it in N m?");
   }
 }
 
@@ -261,15 +280,17 @@ void check_links(const std::vector<MovedLink>& links, const ModelOptions& option
 
 void doubt_units(const RobotModel& model, const std::vector<MovedLink>& links,
                  const KDL::Chain& bare, std::vector<std::string>& warnings) {
-  constexpr double kLongArm = 50;  // m
-  constexpr double kGravity = 30;  // m/s^2, more than on any planet that one stands on
+  constexpr double kLongArm = 50;               // m
+  constexpr double kGravity = 30, kWeak = 1.5;  // m/s^2: beyond the planets, below the Moon
   const double reach = reach_of(bare, model.joints());
   if (reach > kLongArm) {
     warnings.push_back("links: they add up to " + figure(reach) + " m: are lengths in mm?");
     return;
   }
-  if (const double gravity = model.gravity().norm(); gravity > kGravity) {
-    warnings.push_back("gravity: " + figure(gravity) + " m/s^2 is more than on any planet");
+  const double gravity = model.gravity().norm();
+  if (gravity > kGravity || (gravity > 0 && gravity < kWeak)) {
+    warnings.push_back("gravity: " + figure(gravity) +
+                       " m/s^2 is that of no planet: is it in m/s^2?");
   }
   doubt_massless(model, warnings);
   doubt_joints(model, links, reach, warnings);

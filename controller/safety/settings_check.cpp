@@ -71,7 +71,10 @@ struct OtherUnit {
   std::string_view unit, meant;
   double size;
 };
-constexpr std::array<OtherUnit, 5> kOtherUnits = {{{"rad", "deg", std::numbers::pi / 180},
+constexpr std::array<OtherUnit, 8> kOtherUnits = {{{"rad", "deg", std::numbers::pi / 180},
+                                                   {"rad/s^2", "deg/s^2", std::numbers::pi / 180},
+                                                   {"m/s^2", "mm/s^2", 1e-3},
+                                                   {"", "%", 1e-2},
                                                    {"rad/s", "deg/s", std::numbers::pi / 180},
                                                    {"m", "mm", 1e-3},
                                                    {"m/s", "mm/s", 1e-3},
@@ -81,21 +84,30 @@ constexpr std::array<OtherUnit, 5> kOtherUnits = {{{"rad", "deg", std::numbers::
 class ScaleCheck {
  public:
   explicit ScaleCheck(const RobotModel& model) : model_(model) {
-    double along = 0, around = 0;  // m/s, rad/s, if all joints were as fast as they may be
+    double along = 0, around = 0, power = 0;  // m/s, rad/s, W, if all joints did what they may
     const double reach = reach_of(kdl_chain(model), model.joints());
     for (const Joint& joint : model.joints()) {
       const bool slides = joint.type == JointType::kPrismatic;
       along += slides ? joint.velocity : reach * joint.velocity;
       around += slides ? 0 : joint.velocity;
+      power += joint.effort * joint.velocity;
     }
     const char* fastest = "the fastest that the model's joints move the tip, ";
     const char* span = "twice the arm's reach, ";
     const char* times = "a reasonable time, ";
+    const char* motion = "what an arm may need, ";
     most_ = {{"limits.tip_velocity", along, fastest},
              {"motion.linear_velocity", along, fastest},
              {"motion.angular_velocity", around, fastest},
              {"limits.linear_error", 2 * reach, span},
              {"limits.angular_error", std::numbers::pi, "half a turn, "},
+             {"limits.power", power, "what the model's joints give, "},
+             {"limits.external_force", 5000, motion},
+             {"motion.linear_acceleration", 100, motion},
+             {"motion.angular_acceleration", 200, motion},
+             {"integral.force", 2000, motion},
+             {"integral.moment", 1000, motion},
+             {"watchdog.start_torque", 5, "a share that is of use, "},
              {"control.period", 0.1, times},
              {"limits.stopping_time", 5, times},
              {"motion.gain_time", 60, times},
@@ -109,7 +121,8 @@ class ScaleCheck {
 
   void operator()(const Setting& setting, double value) const {
     for (const Most& most : most_) {
-      if (most.key == setting.key) check(most.key, value, most.value, setting.unit, most.what);
+      if (most.key != setting.key || value == setting.none) continue;
+      check(most.key, value, most.value, setting.unit, most.what);
     }
   }
   void operator()(const Setting& setting, const JointVector& values) const {
@@ -120,8 +133,12 @@ class ScaleCheck {
       const std::string unit =
           joint.type == JointType::kPrismatic ? setting.prismatic : setting.unit;
       const std::string what = "the model's limit of joint '" + joint.name + "', ";
-      if (key == "limits.torque" || key == "integral.torque") {
-        check(entry, values[i], joint.effort, unit, what);
+      if (key == "limits.torque" || key == "integral.torque" || key == "limits.external_torque") {
+        if (values[i] != setting.none) check(entry, values[i], joint.effort, unit, what);
+      } else if (key == "limits.torque_rate") {  // all of the torque within a millisecond
+        check(entry, values[i], 1000 * joint.effort, unit, "1000/s times " + what);
+      } else if (key == "motion.acceleration") {
+        check(entry, values[i], 200, unit, "what an arm may need, ");
       } else if (key == "limits.velocity" || key == "motion.velocity") {
         check(entry, values[i], joint.velocity, unit, what);
       } else if (key == "limits.position_upper") {
@@ -147,14 +164,17 @@ class ScaleCheck {
                     const std::string& what, double more = 0, int sign = 1) {
     const bool stated = std::isfinite(most) && (more > 0 || most > 0);
     if (!stated || value <= (more > 0 ? most + more : kShare * most)) return;
-    std::string text = "is " + number(sign * value) + " " + std::string(unit) + ", beyond " + what +
-                       number(sign * most) + " " + std::string(unit);
+    const std::string in = unit.empty() ? "" : " " + std::string(unit);
+    std::string text =
+        "is " + number(sign * value) + in + ", beyond " + what + number(sign * most) + in;
     for (const OtherUnit& other : kOtherUnits) {
       if (other.unit != unit || !(other.size * std::abs(value) <= 2 * std::abs(most))) {
         continue;
       }
-      text += "; is it in " + std::string(other.meant) + "? Write '" + number(sign * value) + " " +
-              std::string(other.meant) + "'";
+      text += "; is it in " + std::string(other.meant) + "? Write '" +
+              (other.meant == "%" ? number(other.size * value)
+                                  : number(sign * value) + " " + std::string(other.meant)) +
+              "'";
     }
     throw InvalidSettings(std::string(key), text + "; limits.beyond_model: true accepts it");
   }
@@ -219,6 +239,20 @@ void validate(const Settings& settings, const RobotModel& model) {
     }
   }
   check_walls(limits.walls);
+  const double far = std::max(10.0, 4 * reach_of(kdl_chain(model), model.joints()));
+  for (const Wall& wall : limits.walls) {
+    const double distance = wall.distance(Eigen::Vector3d::Zero());
+    if (limits.beyond_model || std::abs(distance) <= far) continue;
+    fail("limits.walls", std::abs(distance), "m",
+         "from the base, farther than the arm reaches; is its point in mm? limits.beyond_model: "
+         "true "
+         "accepts it");
+  }
+  const Watchdog& watchdog = settings.watchdog;
+  if (watchdog.setpoint_damp > 0 && watchdog.setpoint_damp < watchdog.setpoint_hold) {
+    fail("watchdog.setpoint_damp", watchdog.setpoint_damp, "s",
+         "before setpoint_hold, " + number(watchdog.setpoint_hold) + " s, which would never come");
+  }
   if (!(settings.watchdog.longest_gap > settings.period)) {
     fail("watchdog.longest_gap", settings.watchdog.longest_gap, "s", "has to exceed the period");
   }

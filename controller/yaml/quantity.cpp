@@ -134,7 +134,10 @@ double parse_quantity(std::string_view text, const std::string& unit) {
   const std::optional<Unit> given = parse_unit(rest);
   if (!given) {
     throw std::invalid_argument("is not a number but " + quoted(text) + ": unknown unit " +
-                                quoted(rest) + (rest.starts_with("degree") ? "; write deg" : ""));
+                                quoted(rest) +
+                                (rest.starts_with("degree") ? "; write deg"
+                                 : rest.starts_with(",") ? "; a decimal comma is written as a point"
+                                                         : ""));
   }
   if (given->powers != parse_unit(unit).value().powers) {
     throw std::invalid_argument("has a wrong unit: " + quoted(text) + "; " +

@@ -307,13 +307,10 @@ def check_postures(robot: Robot, name: str, postures: Iterable[Array]) -> None:
 
 def one_damping(part: str, stiffness: npt.ArrayLike | None, damping: npt.ArrayLike | None,
                 ratio: float) -> None:
-    """Raises Error unless springs have one damping: a matrix or a ratio."""
-    both = f"{part}_damping and {part}_damping_ratio"
-    if damping is not None and ratio:
-        raise Error(f"{both}: either, not both")
+    """Raises Error for springs without damping, of which a matrix or a ratio is wanted."""
     if stiffness is not None and np.any(stiffness) and damping is None and not ratio:
-        raise Error(f"{both}: one of them is wanted beside {part}_stiffness; {part}_damping = zeros "
-                    "is a loop without damping")
+        raise Error(f"{part}_damping and {part}_damping_ratio: one of them is wanted beside "
+                    f"{part}_stiffness; {part}_damping = zeros is a loop without damping")
 
 
 def selected(directions: Sequence[str]) -> list[bool]:

@@ -133,7 +133,8 @@ def run(monkeypatch):
     ("analysis", {"sampled": {"interval": 0.1}}, "analysis.sampled.delay"),
     ("analysis", {"sampled": {"delay": 1, "cutoff": 100.0}}, "analysis.sampled.cutoff"),
     ("control", {"period": 0.002}, "control.period"),
-    ("limits", {"torque": [40] * 4 + [10, 20, 10]}, "limits.torque: 20 of joint 6"),
+    ("limits", {"torque": [40] * 4 + [10, 20, 10], "beyond_model": True},
+     "limits.torque: 20 of joint 6"),
     ("limits", {"torque_rate": 1500}, "limits.torque_rate: 1500 of joint 1")])
 def test_another_loop_is_refused(section, keys, reason):
     with pytest.raises(dashpot.Error, match=reason):

@@ -45,7 +45,8 @@ class Loop:
             "control": {"period": PERIOD, "mode": "cartesian", "load": "base_wrench"},
             "gains": {"task": {"stiffness": [700, 400, 250, 60, 30, 12], "damping_ratio": 0.6},
                       "null_space": {"stiffness": [5] * 7, "damping_ratio": 0.6}},
-            "limits": {"torque": 500, "torque_rate": 1e6, "gain_margin": 1, "velocity": 10},
+            "limits": {"torque": 500, "torque_rate": 1e6, "gain_margin": 1, "velocity": 10,
+                       "beyond_model": True},
             "analysis": {"share": 1, "sampled": {"interval": 0.2}},
         })
         self.time = 0

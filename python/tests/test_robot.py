@@ -161,7 +161,7 @@ def test_a_closed_loop_that_cannot_be_is_refused(panda):
             (dict(task_stiffness=[1] * 6, frame="world"), "gains.task.frame: .*'world'"),
             (dict(task_stiffness=[1] * 6, directions=["w"]), "gains.task.directions: .*'w'"),
             (dict(task_stiffness=[1] * 6, task_damping=[1] * 6, task_damping_ratio=0.7),
-             "task_damping and task_damping_ratio: either, not both"),
+             "gains.task.damping_ratio: stands beside damping"),
             (dict(task_stiffness=[1] * 6), "task_damping and task_damping_ratio: one of them"),
             (dict(joint_stiffness=[1] * 7), "joint_damping and joint_damping_ratio: one of them"),
             (dict(task_stiffness=[1] * 6, task_damping=[1] * 6, null_stiffness=[1] * 7),

@@ -76,7 +76,7 @@ TEST(Inspect, PrintsWhatKdlComputesForEachArm) {
     SCOPED_TRACE(arm.file);
     const controller::RobotModel model = dashpot::testing::arm_model(arm);
     const bool six = model.dof() == 6;
-    const std::string qd = six ? "1,0,-1,0.5,2,-2" : "1,0,-1,0.5,2,-2,1e-1";
+    const std::string qd = six ? "1,0,-1,0.5,1,-1" : "1,0,-1,0.5,1,-1,1e-1";
     controller::JointVector position = controller::default_posture(model), velocity(model.dof());
     std::string q;
     for (int i = 0; i < model.dof(); ++i) {
@@ -85,7 +85,7 @@ TEST(Inspect, PrintsWhatKdlComputesForEachArm) {
       std::snprintf(text.data(), text.size(), "%s%.17g", i > 0 ? "," : "", position[i]);
       q += text.data();
     }
-    velocity.head(6) << 1, 0, -1, 0.5, 2, -2;
+    velocity.head(6) << 1, 0, -1, 0.5, 1, -1;
     if (!six) velocity[6] = 0.1;
     expect_matches(parse(inspect(arm, {"--q", q, "--qd", qd, "--json"})),
                    dashpot::testing::by_kdl(model, position, velocity));
@@ -148,9 +148,9 @@ TEST(Inspect, RefusesDegreesWithoutTheirUnit) {
 TEST(Inspect, TakesUnits) {
   EXPECT_EQ(
       parse(inspect_panda(
-          {"--json", "--q", "90 deg,0,-150deg,-1 rad,0,1 rad,0", "--qd", "60 rpm,0,0,0,0,0,0"})),
+          {"--json", "--q", "90 deg,0,-150deg,-1 rad,0,1 rad,0", "--qd", "6 rpm,0,0,0,0,0,0"})),
       parse(inspect_panda({"--json", "--q", "1.5707963267948966,0,-2.6179938779914944,-1,0,1,0",
-                           "--qd", "6.283185307179586,0,0,0,0,0,0"})));
+                           "--qd", "0.6283185307179586,0,0,0,0,0,0"})));
   const dashpot::testing::Arm lift = {"lift_gripper", "base", "fingertip"};
   EXPECT_EQ(parse(inspect(lift, {"--json", "--q", "25 cm,90 deg,0,0,1 cm"})),
             parse(inspect(lift, {"--json", "--q", "0.25,1.5707963267948966,0,0,0.01"})));
@@ -208,10 +208,11 @@ TEST(Inspect, ShowsLimitsOfVersion12WhereTheyAreStated) {
 
 TEST(Inspect, AddsReflectedInertia) {
   const Json bare = parse(inspect_panda({"--json"}));
-  const Json geared = parse(inspect_panda({"--json", "--reflected-inertia", "1,2,3,4,5,6,7"}));
+  const Json geared =
+      parse(inspect_panda({"--json", "--reflected-inertia", "0.1,0.2,0.3,0.4,0.5,0.6,0.7"}));
   for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_NEAR(geared["mass_matrix"][i][i].get<double>(),
-                bare["mass_matrix"][i][i].get<double>() + static_cast<double>(i + 1), 1e-14);
+                bare["mass_matrix"][i][i].get<double>() + 0.1 * static_cast<double>(i + 1), 1e-14);
   }
   EXPECT_EQ(parse(inspect_panda({"--json", "--reflected-inertia", "0.5"})),
             parse(inspect_panda({"--json", "--reflected-inertia", "0.5,0.5,0.5,0.5,0.5,0.5,0.5"})));

@@ -63,8 +63,8 @@ TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
   const Words audit = joined(of_panda("audit", kStiffness), {"--damping-factor", "2"});
   const Words design = joined(of_panda("design", kStiffness), {"--damping-ratio"});
   for (const Words& words : {audit, joined(design, {"1"})}) {
-    expect_refusal(run_program(joined(words, {"--period", "1000"})),
-                   "a period up to 1 s is wanted, not '1000'; is '1000 ms' meant?");
+    expect_refusal(run_program(joined(words, {"--period", "1"})),
+                   "a period up to 0.1 s is wanted, not '1'; is '1 ms' meant?");
     const Outcome spread = run_program(joined(words, {"--samples", "5", "--spread", "20"}));
     expect_refusal(spread, "is wanted, not '20'; is '20 deg' meant?");
   }
@@ -74,6 +74,10 @@ TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
   EXPECT_THAT(heavy.err, ::testing::HasSubstr("warning: payload: its mass, 800 kg, "));
   EXPECT_THAT(heavy.err, ::testing::HasSubstr(": is it in g, or "));
   EXPECT_EQ(run_program(joined(audit, {"--payload", "0.8"})).err, "");
+  expect_refusal(run_program(joined(audit, {"--period", "1ms", "--delay", "2ms"})),
+                 "--delay: a whole number of ticks from 0 to 100 is wanted, not '2ms'");
+  const Outcome fast = run_program(of_panda("inspect", {"--qd", "30,20,20,20,0,0,0"}));
+  EXPECT_THAT(fast.err, ::testing::HasSubstr("joint 'panda_joint1' is faster than its limit, 2.1"));
   const Outcome turned = run_program(
       of_panda("audit", {"--stiffness", "20,20,20,600,600,600", "--damping-factor", "2"}));
   EXPECT_THAT(turned.err, ::testing::HasSubstr("warning: task stiffness: 600 N m/rad against "));

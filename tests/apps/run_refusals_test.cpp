@@ -36,15 +36,17 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
             "scenario.steps[1].tip_displacement: is out of the arm's reach, by @ m and @ rad "
             "(line 76)"},
            {"panda", "position: [0, -45 deg", "position: [0, -145 deg",
-            "scenario.start.position: joint 2 would be at -2.530727 rad, outside its limits "
-            "(line 63)"},
+            "scenario.start.position: joint 'panda_joint2' at -2.53073 rad is outside its limits "
+            "-1.7628 to 1.7628 rad (line 63)"},
            {"iiwa14", "    position: [0, 30 deg, 0, -80 deg, 0, 60 deg, 0]\n", "",
             "scenario.start.position: missing (line 20)"},
            {"ur5", "at: 4 s", "at: 1 s",
             "scenario.steps[2].at: is before the step above it (line 24)"},
            {"iiwa14", "joint_position: [0.3, 0.7", "joint_position: [9.3, 0.7",
-            "scenario.steps[1].joint_position: joint 1 would be at 9.300000 rad, outside its "
-            "limits (line 26)"},
+            "scenario.steps[1].joint_position: joint 'iiwa_joint_1' at 9.3 rad is outside its "
+            "limits "
+            "-2.96706 to 2.96706 rad; if these are degrees, give each number its unit: 'deg' (line "
+            "26)"},
            {"panda", "damping: [20 N s/m, 20", "damping: [-20 N s/m, 20",
             "scenario.steps: the controller refuses this: task_damping is not positive "
             "semidefinite (line 77)"},

@@ -215,7 +215,9 @@ TEST(UrdfForms, AreDoubtedWhereUnitsCannotBeRight) {
       << "all of them in grams";
   EXPECT_THAT(warnings("lower=\"-2.8973\" upper=\"2.8973\" velocity=\"2.175\"",
                        "lower=\"-166\" upper=\"166\" velocity=\"150\""),
-              ::testing::Contains(HasSubstr("are many turns: are they in deg?")));
+              ::testing::Contains(HasSubstr("is many turns: is it in deg?")));
+  EXPECT_THAT(warnings("velocity=\"2.175\" effort=\"87\"", "velocity=\"20.8\" effort=\"87000\""),
+              ElementsAre(HasSubstr("is it in deg/s or rpm?"), HasSubstr("is it in N m?")));
 }
 
 TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
@@ -238,10 +240,16 @@ TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
             [](O& o) {
               o.payload = {1, {}, 1e6 * Eigen::Matrix3d::Identity()};
             }},
-           {"joint 'panda_joint1': its reflected inertia, 3000 kg m^2, is more than that of",
+           {"joint 'panda_joint1': its reflected inertia, 3000 kg m^2, is hardly one of an arm of",
             [](O& o) { o.reflected_inertia.setConstant(7, 3000); }}}) {
     EXPECT_THAT(warnings(change), ::testing::Contains(HasSubstr(said)));
   }
+  EXPECT_THAT(warnings([](O& o) { o.reflected_inertia.setConstant(7, 1e-5); }),
+              ::testing::Contains(HasSubstr("multiplied by the gear ratio's square?")));
+  EXPECT_THAT(warnings([](O& o) {
+                o.gravity = {0, 0, -1};
+              }),
+              ElementsAre("gravity: 1 m/s^2 is that of no planet: is it in m/s^2?"));
   EXPECT_THAT(warnings([](O& o) {
                 o.tool.position = {0, 0, 0.3};
                 o.payload = {3, {0, 0, 0.1}, 0.01 * Eigen::Matrix3d::Identity()};

@@ -192,9 +192,20 @@ TEST(ConfigRefuses, WhatIsBeyondTheModel) {
        {"limits: {tip_velocity: 250", "limits: {linear_error: 300", "motion: {linear_velocity: 250",
         "motion: {angular_velocity: 90", "watchdog: {setpoint_hold: 500",
         "watchdog: {setpoint_damp: 2000", "watchdog: {feedback: 500",
-        "watchdog: {release_after: 2000", "integral: {time: 500", "motion: {gain_time: 500"}) {
+        "watchdog: {release_after: 2000", "integral: {time: 500", "motion: {gain_time: 500",
+        "motion: {linear_acceleration: 2000", "motion: {acceleration: 340",
+        "motion: {angular_acceleration: 340", "watchdog: {start_torque: 25"}) {
     EXPECT_THAT(complaint(panda() + key + "}"), HasSubstr("; is it in ")) << key;
   }
+  for (const char* key :
+       {"limits: {external_torque: 300", "limits: {external_force: 6000", "limits: {power: 200000",
+        "limits: {torque_rate: 1e9", "integral: {force: 10000", "integral: {moment: 5000"}) {
+    EXPECT_THAT(complaint(panda() + key + "}"), HasSubstr(", beyond ")) << key;
+  }
+  EXPECT_THAT(complaint(panda() + "limits: {walls: [{point: [0, 0, -50], normal: [0, 0, 1]}]}"),
+              HasSubstr("limits.walls: is 50 m, from the base, farther than the arm reaches"));
+  EXPECT_THAT(complaint(panda() + "watchdog: {setpoint_hold: 2, setpoint_damp: 0.5}"),
+              HasSubstr("before setpoint_hold, 2 s, which would never come"));
   EXPECT_NO_THROW(load(panda() + "limits: {velocity: 2.18, torque: 12, position_lower: [-2.9, -1, "
                                  "-1, -2, -1, 0, -1]}"));
 }
@@ -218,6 +229,8 @@ TEST(ConfigRobot, HasKeysThatAreChecked) {
            {"robot.payload.mass: is -1 kg, negative (line 2)", ", payload: {mass: -1 kg}"},
            {"robot.payload.weight: unknown key; the keys are mass, center, inertia (line 2)",
             ", payload: {weight: 1}"},
+           {"robot.payload: has a centre or inertia, and no mass (line 2)",
+            ", payload: {center: [0, 0, 0.05]}"},
            {"robot.payload.inertia: has 2 entries; a list of 3, or one number for all, is wanted "
             "(line 2)",
             ", payload: {inertia: [1, 2]}"},
