@@ -111,6 +111,18 @@ class Browser:
         raise RuntimeError(f'does not become true: {expression}; '
                            + str(self.value('JSON.stringify(window.dashpot?.errors)')))
 
+    @staticmethod
+    def eventually(check, seconds=120):
+        """Returns what `check` returns as soon as it raises no AssertionError."""
+        end = time.monotonic() + seconds
+        while True:
+            try:
+                return check()
+            except AssertionError:
+                if time.monotonic() > end:
+                    raise
+            time.sleep(0.05)
+
     def errors(self):
         """Returns what went wrong on the page: exceptions, errors in the log, refused resources.
 

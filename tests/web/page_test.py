@@ -3,7 +3,6 @@ import math
 import os
 import subprocess
 import sys
-import time
 
 sys.dont_write_bytecode = True
 from page_site import FOLDER, PROGRAM, SOURCE, PageTest, Site, main, run, write
@@ -42,12 +41,24 @@ class Page(PageTest):
         cls.log = os.path.join(FOLDER, 'wheel.lcm')
         run('run', cls.scene, '--fast', '--duration', '6', '--log', cls.log)
 
-    def expect_poles(self, found, re, im):
-        found = sorted(found, key=lambda pole: pole['im'])
-        self.assertEqual(len(found), 2)
-        for pole, sign in zip(found, (-1, 1)):
-            self.assertAlmostEqual(pole['re'], re, places=6)
-            self.assertAlmostEqual(pole['im'], sign * im, places=6)
+    def await_poles(self, re, im):
+        def drawn():
+            found = sorted(self.browser.value(FINITE_POLES), key=lambda pole: pole['im'])
+            self.assertEqual(len(found), 2)
+            for pole, sign in zip(found, (-1, 1)):
+                self.assertAlmostEqual(pole['re'], re, places=6)
+                self.assertAlmostEqual(pole['im'], sign * im, places=6)
+            return found
+        return self.browser.eventually(drawn)
+
+    def await_frequency(self, re, im):
+        """The cells of the table, once it shows the natural frequency of this pole."""
+        def shown():
+            cells = self.browser.value(
+                "[...document.querySelectorAll('#rows td')].map((c) => c.textContent)")
+            self.assertEqual(float(cells[1]), float(f'{math.hypot(re, im):.4g}'))
+            return cells
+        return self.browser.eventually(shown)
 
     def test_draws_a_known_pole_where_it_belongs(self):
         site = Site('--log', self.log, '--config', self.scene)
@@ -55,10 +66,8 @@ class Page(PageTest):
         self.browser.value('dashpot.seek(2)')
         self.browser.until('dashpot.frame.utime > 1990000 && dashpot.frame.utime < 2010000 && '
                            'dashpot.poles.length == 2')
-        time.sleep(0.2)
         re, im = poles(50, 4)
-        found = self.browser.value(FINITE_POLES)
-        self.expect_poles(found, re, im)
+        found = self.await_poles(re, im)
         # On the canvas: on the ray of its ratio, and painted.
         origin = self.browser.value('dashpot.origin')
         for pole in found:
@@ -71,8 +80,7 @@ class Page(PageTest):
                 const s = c.width / c.clientWidth; return [...c.getContext('2d').getImageData(
                 {pole['x']} * s, {pole['y']} * s, 1, 1).data]; }})()''')
             self.assertEqual(pixel, [0x00, 0x72, 0xb2, 255])
-        cells = self.browser.value("[...document.querySelectorAll('#rows td')].map((c) => c.textContent)")
-        self.assertEqual(float(cells[1]), float(f'{math.hypot(re, im):.4g}'))
+        cells = self.await_frequency(re, im)
         self.assertEqual(float(cells[3]), round(-re / math.hypot(re, im), 3))
         # The response, as the one-line formula has it.
         self.browser.value("(document.getElementById('place').value = 'joint/0', "
@@ -94,11 +102,9 @@ class Page(PageTest):
             self.browser.value("document.getElementById('faster').click()")
         self.browser.until("document.getElementById('play').textContent == 'Play'")
         self.browser.until('dashpot.frame.modes.tick == %d' % self.last_tick())
-        time.sleep(0.2)
         re, im = poles(200, 4)
-        self.expect_poles(self.browser.value(FINITE_POLES), re, im)
-        shown = self.browser.value("[...document.querySelectorAll('#rows td')].map((c) => c.textContent)")
-        self.assertEqual(float(shown[1]), float(f'{math.hypot(re, im):.4g}'))
+        self.await_poles(re, im)
+        self.await_frequency(re, im)
         said = run('monitor', '--log', self.log)
         self.assertIn(f'{math.hypot(re, im):.4g}', said)
         for t, stiffness in (1, 50), (5, 200):  # what the curve tells under the pointer
@@ -135,7 +141,7 @@ class Page(PageTest):
                 re, im = poles(stiffness, 4)
                 self.browser.until(f'dashpot.poles.length == 2 && '
                                    f'Math.abs(Math.abs(dashpot.poles[0].im) - {im}) < 1e-6')
-                self.expect_poles(self.browser.value(FINITE_POLES), re, im)
+                self.await_poles(re, im)
             self.browser.until("document.getElementById('response_note').textContent.includes('others')")
             site.stop()
             self.browser.until("document.getElementById('link')?.textContent.includes('lost') || "
@@ -144,7 +150,7 @@ class Page(PageTest):
             before = self.browser.value('dashpot.frames')
             self.browser.until("document.getElementById('link')?.textContent == 'connected' && "
                                f'dashpot.frames > {before + 30}')
-            self.expect_poles(self.browser.value(FINITE_POLES), re, im)
+            self.await_poles(re, im)
         finally:
             loop.terminate()
             loop.wait()

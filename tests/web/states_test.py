@@ -164,12 +164,14 @@ class States(PageTest):
         self.assertEqual(len(rows), JOINTS)
         self.seek(1)
         self.browser.until("document.querySelectorAll('#rows tr').length == 16")
-        time.sleep(0.5)
-        shown = dict(self.browser.value(
-            "[...document.querySelectorAll('#rows tr')].map((r) => [r.cells[0].innerText.trim(), r.cells[6].textContent])"))
-        for label, shape in rows:
-            page = shown[label].replace('−', '-').replace('°', ' deg').replace(' …', '')
-            self.assertTrue(page.startswith(shape) or shape.startswith(page), (shape, page))
+
+        def as_in_the_terminal():
+            shown = dict(self.browser.value(
+                "[...document.querySelectorAll('#rows tr')].map((r) => [r.cells[0].innerText.trim(), r.cells[6].textContent])"))
+            for label, shape in rows:
+                page = shown[label].replace('−', '-').replace('°', ' deg').replace(' …', '')
+                self.assertTrue(page.startswith(shape) or shape.startswith(page), (shape, page))
+        self.browser.eventually(as_in_the_terminal)
         self.assertEqual(self.text('#joints tr:nth-child(16)').split()[:2], ['q16', 'hinge_16'])
         site.stop()
 
@@ -193,7 +195,7 @@ class States(PageTest):
     def test_other_joints_are_said_once(self):
         site = self.replay(self.log, os.path.join(SOURCE, 'sim/scenes/ur5.yaml'), 0.75)
         self.browser.until("document.getElementById('arm').getAttribute('aria-label').startsWith('other joints: the loop has 16')")
-        time.sleep(1.5)
+        time.sleep(1.5)  # whatever would say it later
         self.assertNotIn('other joints', self.text('body'))
         labels = self.browser.value("[...document.querySelectorAll('canvas')].map((c) => c.getAttribute('aria-label'))")
         self.assertEqual(sum('other joints' in label for label in labels if label), 1)
@@ -243,11 +245,13 @@ class States(PageTest):
         run('run', scene, '--fast', '--duration', '3', '--log', log)
         site = self.replay(log, scene, 2.5)
         self.browser.until("document.getElementById('arm').getAttribute('aria-label').includes('contact')")
-        time.sleep(0.3)
-        label, z = self.browser.value("[document.getElementById('arm').getAttribute('aria-label'), dashpot.frame.state.tip_position[2]]")
-        depth, newton = (float(x) for x in re.search(r'pressed in by ([\d.]+) mm, contact ([\d.]+) N', label).groups())
-        self.assertAlmostEqual(depth, 1e3 * (0.4559 - z), delta=0.01)
-        self.assertAlmostEqual(newton, 2e4 * (0.4559 - z), delta=1)
+
+        def pressed_in():
+            label, z = self.browser.value("[document.getElementById('arm').getAttribute('aria-label'), dashpot.frame.state.tip_position[2]]")
+            depth, newton = (float(x) for x in re.search(r'pressed in by ([\d.]+) mm, contact ([\d.]+) N', label).groups())
+            self.assertAlmostEqual(depth, 1e3 * (0.4559 - z), delta=0.01)
+            self.assertAlmostEqual(newton, 2e4 * (0.4559 - z), delta=1)
+        self.browser.eventually(pressed_in)
         site.stop()
 
     def drawings(self, seconds):
@@ -261,16 +265,15 @@ class States(PageTest):
     def test_draws_only_what_changes_and_heeds_who_wants_no_motion(self):
         site = self.replay(self.log, self.scene, 0.75)
         self.browser.until('dashpot.response')
-        time.sleep(1.5)
-        self.assertEqual(self.drawings(2), {})
+        def still():
+            self.assertEqual(self.drawings(2), {})
+        self.browser.eventually(still)
         self.browser.value("document.querySelector('#chips button').click()")
-        time.sleep(0.5)
-        found = self.drawings(2)  # the shape swings
-        self.assertEqual(list(found), ['arm'])
+        self.browser.eventually(  # the shape swings
+            lambda: self.assertEqual(list(self.drawings(2)), ['arm']))
         self.browser.call('Emulation.setEmulatedMedia', features=[{'name': 'prefers-reduced-motion', 'value': 'reduce'}])
         try:
-            time.sleep(1)
-            self.assertEqual(self.drawings(2), {})
+            self.browser.eventually(still)
             self.assertIn('mode', self.browser.value("document.getElementById('arm').getAttribute('aria-label')"))
         finally:
             self.browser.call('Emulation.setEmulatedMedia', features=[])
@@ -278,7 +281,7 @@ class States(PageTest):
 
     def test_says_what_each_part_is(self):
         site = self.replay(self.log, self.scene, 0.75)
-        time.sleep(1.5)
+        self.browser.until('dashpot.response')
         unnamed = self.browser.value('''[...document.querySelectorAll('canvas, section, button, input, select, table')].filter((e) =>
             !e.hidden && !(e.getAttribute('aria-label') || e.getAttribute('aria-labelledby') || e.innerText || e.closest('label')))
             .map((e) => e.id)''')
