@@ -205,6 +205,7 @@ std::vector<const DecayFit*> ModelSearch::best_of_sizes() const {
     if (there == nullptr || score(model) < score(*there)) there = &model;
   }
   std::vector<const DecayFit*> models;
+  models.reserve(best.size());
   for (const auto& [size, model] : best) models.push_back(model);
   std::sort(models.begin(), models.end(),
             [this](const DecayFit* a, const DecayFit* b) { return score(*a) < score(*b); });
