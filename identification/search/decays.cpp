@@ -140,24 +140,18 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   }
   scale = scale.cwiseMax(1e-300);
   result.explained = 1 - rest.cwiseQuotient(scale).mean();
-  constexpr double kLightly = 0.1;
   std::vector<MeasuredMode> modes;
   Index at = 0;
   for (std::size_t k = 0; k < search.fit.factors.size(); ++k) {
     modes.push_back(to_mode(search, k, at, scale, static_cast<double>(scale.size())));
-    MeasuredMode& mode = modes.back();
-    mode.stability = stability_of(mode, search.by_order, search.order);
-    // What is weak is copied from order to order.
-    const double enough = mode.damping_ratio < kLightly ? 3e-3 : 1e-3;
-    if (mode.stability == 0 && mode.energy > std::max(enough, 1 - result.explained)) {
-      mode.stability = search.repeated(search.fit.factors[k]);
-    }
+    modes.back().stability = stability_of(modes.back(), search.by_order, search.order);
     at += search.fit.factors[k].parameters();
   }
   if (search.larger) doubt_order(search.fit, *search.larger, modes);
   result.order = static_cast<int>(at);
   // Friction makes of one mode others near it, heavily damped ones, and weak ones.
-  constexpr double kShare = 0.1, kFarFromWhite = 2, kMuch = 0.1, kOfRest = 0.3, kHeavily = 0.15;
+  constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2, kMuch = 0.1, kOfRest = 0.3,
+                   kPoor = 0.01;
   double most = 0;
   for (const MeasuredMode& mode : modes) {
     if (mode.damping_ratio < kLightly) most = std::max(most, mode.energy);
@@ -167,12 +161,14 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   const bool doubted = coloured && (search.data.inputs == 0 || 1 - result.explained > kMuch);
   for (MeasuredMode& mode : modes) {
     const double unexplained = 1 - result.explained;
-    if (mode.energy < kOfRest * unexplained) mode.reason = "much weaker than what is left over";
-    if (mode.stability == 0 && (search.data.inputs > 0 || mode.energy < unexplained)) {
-      mode.reason = "in no model of another order";
+    if (mode.stability > 0 && mode.energy < kOfRest * unexplained) {
+      mode.reason = "much weaker than what is left over";
+    } else if (mode.stability == 0 && mode.energy < unexplained) {
+      mode.reason = "weaker than what is left over, and in no model of another order";
+    } else if (mode.stability == 0 && unexplained > kPoor) {
+      mode.reason = "in no model of another order, and much is left over";
     }
-    if ((doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) ||
-        (1 - result.explained > kMuch && mode.damping_ratio > kHeavily)) {
+    if (doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
       mode.reason = std::string(search.differs                 ? "parts of the records differ"
                                 : 1 - result.explained > kMuch ? "much is left over"
                                                                : "what is left over is no noise") +

@@ -64,27 +64,22 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
 }
 
 constexpr double kHarmonic = 3;  // of friction and other forces that are odd; sums tell even ones
-constexpr double kMostEnergy = 100;   // energy of what cancels against others
-constexpr double kCoincides = 0.002;  // relative: what is not linear moves the larger modes, too
-/// Deviations, relative and of a ratio, up to which a mode is believed, less where what is left
-/// over is no noise, and up to which it need not be in models of other orders.
-constexpr double kUnsure = 0.06, kUnsureIfColoured = 0.05, kSharp = 0.005, kSharpRatio = 0.01;
-constexpr double kDecays = 0.05;        // an exponent: less is a hum, or a cycle
+constexpr double kMostEnergy = 100;     // energy of what cancels against others
+constexpr double kCoincides = 0.002;    // relative: what is not linear moves the larger modes, too
 constexpr double kLightlyDamped = 0.3;  // what lasts long enough to have harmonics
 
 /// Why a mode is not to be believed; empty if it is.
 std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all, double duration,
-                  double step, bool white) {
+                  double step) {
   const auto& lambda = mode.eigenvalues;
   if (lambda[0] == lambda[1] && lambda[0].imag() == 0) {
     return "a decay without oscillation, whose partner the records do not show";
   }
   if (mode.energy > kMostEnergy) return "it cancels against others like it: neither is determined";
-  const double unsure = white ? kUnsure : kUnsureIfColoured;
-  if (!(mode.natural_frequency_std < unsure * mode.natural_frequency)) {
+  if (!(mode.natural_frequency_std < 0.05 * mode.natural_frequency)) {
     return "its frequency is not determined";
   }
-  if (!(mode.damping_ratio_std < unsure * std::max(1.0, mode.damping_ratio))) {
+  if (!(mode.damping_ratio_std < 0.05 * std::max(1.0, mode.damping_ratio))) {
     return "its damping ratio is not determined";
   }
   if (mode.natural_frequency * step > 2.5) return "too fast for the samples";
@@ -92,15 +87,9 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
       -lambda[0].real() * duration < 1) {
     return "too slow for the record";
   }
-  if (mode.stability == 0) {
-    if (mode.energy < (mode.damping_ratio < 0.1 ? 3e-3 : 1e-3)) {
-      return "weak, and in no model of another order";
-    }
-    if (mode.natural_frequency_std > kSharp * mode.natural_frequency ||
-        mode.damping_ratio_std > kSharpRatio) {
-      return "in no model of another order";
-    }
-  }
+  // Other orders miss heavily damped modes, but no lightly damped one that is there.
+  const double enough = mode.damping_ratio < 0.1 ? 3e-3 : 1e-3;
+  if (mode.stability == 0 && mode.energy < enough) return "weak, and in no model of another order";
   if (mode.energy < 1e-6) return "too weak to be told from what is not linear";
   for (const MeasuredMode& other : all) {
     if (other.energy > 2 * mode.energy && likeness(other.shape, mode.shape) > 0.8 &&
@@ -119,7 +108,6 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
   }
   if (mode.damping_ratio + 2 * mode.damping_ratio_std < 0) return "it grows";
   if (mode.damping_ratio <= 0) return "it does not decay within its deviation";
-  if (-lambda[0].real() * duration < kDecays) return "it does not decay in the record";
   // Of modes that are known themselves.
   const auto explains = [&mode](const MeasuredMode& other) {
     return &other != &mode && other.energy > 10 * mode.energy && other.energy < kMostEnergy;
@@ -193,12 +181,22 @@ double stability_of(const MeasuredMode& mode,
 
 void judge(std::vector<MeasuredMode> modes, double duration, double step, Identification& result) {
   pair_reals(modes);
-  constexpr double kWhite = 1.05;
-  const bool white = result.whiteness < kWhite;
   for (const MeasuredMode& mode : modes) {
     MeasuredMode judged = mode;
-    if (judged.reason.empty()) judged.reason = doubt(mode, modes, duration, step, white);
+    if (judged.reason.empty()) judged.reason = doubt(mode, modes, duration, step);
     (judged.reason.empty() ? result.modes : result.rejected).push_back(std::move(judged));
+  }
+  // Where the rest is coloured, as by friction, and most of a model is rejected, the remaining
+  // modes only make up for it as well.
+  constexpr double kWhite = 1.5;
+  if (result.whiteness > kWhite && result.rejected.size() > result.modes.size()) {
+    const auto alone = std::stable_partition(result.modes.begin(), result.modes.end(),
+                                             [](const auto& mode) { return mode.stability > 0; });
+    for (auto mode = alone; mode != result.modes.end(); ++mode) {
+      mode->reason = "in no model of another order, and most of this one is not believed";
+      result.rejected.push_back(std::move(*mode));
+    }
+    result.modes.erase(alone, result.modes.end());
   }
   const auto slower = [](const MeasuredMode& a, const MeasuredMode& b) {
     return a.natural_frequency < b.natural_frequency;

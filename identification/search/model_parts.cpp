@@ -1,12 +1,10 @@
 // Compares parts of the records with the model of the whole.
-#include <dashpot/identification/model/decay_columns.hpp>
 #include <dashpot/identification/search/model_search.hpp>
 
 #include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <utility>
 
 namespace dashpot::identification {
@@ -28,21 +26,6 @@ constexpr double kDeviations = 3;  ///< by which an estimate may be off by chanc
 constexpr double kVague = 0.05;
 /// and does not have a factor that differs by more, unless its deviation explains it.
 constexpr double kSame = 0.05, kSameRatio = 0.15;
-
-/// The factor of a model nearest to one, if it is near; else none.
-const DecayFactor* near_in(const DecayFit& model, const DecayFactor& factor) {
-  constexpr double kBeside = 0.06;  // of an eigenvalue: copies of nothing are farther apart
-  const auto lambda = factor.eigenvalues();
-  const DecayFactor* nearest = nullptr;
-  double least = kBeside;
-  for (const DecayFactor& other : model.factors) {
-    const auto there = other.eigenvalues();
-    const double far = std::max(std::abs(there[0] - lambda[0]) / std::abs(lambda[0]),
-                                std::abs(there[1] - lambda[1]) / std::abs(lambda[1]));
-    if (other.pair == factor.pair && far < least) least = far, nearest = &other;
-  }
-  return nearest;
-}
 
 }  // namespace
 
@@ -126,7 +109,7 @@ void ModelSearch::keep_repeated() {
   const bool copied =
       std::max(colour_, fit.whiteness) > kColoured && copy_in(fit) < fit.factors.size();
   if (contradicted(fit, scatter) == fit.factors.size() && !copied) {
-    add_spread_of_orders();
+    if (fit.whiteness > kColoured) add_spread_of_orders();
     return;
   }
   differs = true;
@@ -196,50 +179,23 @@ std::size_t ModelSearch::copy_in(const DecayFit& whole) const {
   return whole.factors.size();
 }
 
-/// The best model of each size, the best of them first.
-std::vector<const DecayFit*> ModelSearch::best_of_sizes() const {
-  std::map<Index, const DecayFit*> best;
-  for (const DecayFit& model : plain_by_order_) {
-    if (model.factors.empty() || !std::isfinite(model.criterion)) continue;
-    const DecayFit*& there = best[factor_width(model.factors)];
-    if (there == nullptr || score(model) < score(*there)) there = &model;
-  }
-  std::vector<const DecayFit*> models;
-  models.reserve(best.size());
-  for (const auto& [size, model] : best) models.push_back(model);
-  std::sort(models.begin(), models.end(),
-            [this](const DecayFit* a, const DecayFit* b) { return score(*a) < score(*b); });
-  return models;
-}
-
-double ModelSearch::repeated(const DecayFactor& factor) const {
-  constexpr std::size_t kModels = 4;
-  std::vector<const DecayFit*> models = best_of_sizes();
-  models.resize(std::min(models.size(), kModels));
-  const auto having = std::count_if(models.begin(), models.end(), [&](const DecayFit* model) {
-    return near_in(*model, factor) != nullptr;
-  });
-  return having < 2 ? 0 : static_cast<double>(having) / static_cast<double>(models.size());
-}
-
-/// How models of other sizes differ is part of the deviations: the best of them, or all where parts
-/// differ or what is left over is no noise.
+/// Where parts differ, or what is left over is no noise, models of other orders differ, too: how
+/// they do is part of the deviations.
 void ModelSearch::add_spread_of_orders() {
-  std::vector<const DecayFit*> models = best_of_sizes();
-  std::erase_if(models, [this](const DecayFit* model) {
-    return factor_width(model->factors) == factor_width(fit.factors);
-  });
-  if (!differs && fit.whiteness <= kColoured)
-    models.resize(std::min<std::size_t>(1, models.size()));
   for (std::size_t k = 0; k < fit.factors.size(); ++k) {
-    const DecayFactor& factor = fit.factors[k];
+    if (!fit.factors[k].pair) continue;
     std::array<double, 2> sum{};
     double count = 0;
-    for (const DecayFit* model : models) {
-      const DecayFactor* there = factor.pair ? near_in(*model, factor) : nullptr;
-      if (there == nullptr) continue;
-      sum[0] += std::pow(there->first - factor.first, 2);
-      sum[1] += std::pow(there->second - factor.second, 2);
+    for (const DecayFit& model : plain_by_order_) {
+      const DecayFactor* nearest = nullptr;
+      double least = kCopies;
+      for (const DecayFactor& factor : model.factors) {
+        const double distance = std::abs(factor.first - fit.factors[k].first);
+        if (factor.pair && distance < least) least = distance, nearest = &factor;
+      }
+      if (nearest == nullptr) continue;
+      sum[0] += std::pow(nearest->first - fit.factors[k].first, 2);
+      sum[1] += std::pow(nearest->second - fit.factors[k].second, 2);
       ++count;
     }
     for (std::size_t i : {0U, 1U}) scatter[k][i] += count > 0 ? sum[i] / count : 0;

@@ -176,7 +176,6 @@ ModelSearch::ModelSearch(const ExcitedCells& cells, const IdentifyOptions& optio
   }
   forget_useless_larger();
   scatter.resize(fit.factors.size());
-  add_spread_of_orders();
 }
 
 void ModelSearch::refine(const ExcitedCells& all) {

@@ -24,10 +24,6 @@ class ModelSearch {
   /// Refines what was found in the beginnings of records on all of them.
   void refine(const ExcitedCells& all);
 
-  /// The share of the best models of other orders, each refined from a start of its own, that have
-  /// a factor of the model; 0 unless two of unlike size have it.
-  double repeated(const DecayFactor& factor) const;
-
   DecayFit fit;                                     ///< of the samples as they are
   std::vector<std::vector<RealizedPole>> by_order;  ///< from order 1
   int order = 0;                                    ///< of the realization chosen
@@ -50,7 +46,6 @@ class ModelSearch {
   std::size_t contradicted(const DecayFit& whole, std::vector<std::array<double, 2>>& shown) const;
   void drop(std::size_t factor);
   std::size_t copy_in(const DecayFit& whole) const;
-  std::vector<const DecayFit*> best_of_sizes() const;
   void add_spread_of_orders();
   double score(const DecayFit& some) const;
   std::vector<DecayFactor> candidates() const;

@@ -350,10 +350,9 @@ TEST(IdentifyDecays, DeviationsHoldWhatALargerModelThinks) {
     const ModelSearch search(records, {});
     const Identification found = identify_decays(records);
     if (!search.larger) continue;
-    Index at = 0, k = 0;
+    Index at = 0;
     for (const DecayFactor& factor : search.fit.factors) {
       ASSERT_TRUE(factor.pair);
-      const auto [dw_parts, dz_parts] = search.scatter[static_cast<std::size_t>(k++)];
       const double w = std::exp(factor.first), ratio = factor.second;
       const auto same = [&](const double frequency) { return std::abs(frequency / w - 1) < 0.1; };
       for (const MeasuredMode& mode : found.modes) {
@@ -362,11 +361,9 @@ TEST(IdentifyDecays, DeviationsHoldWhatALargerModelThinks) {
           if (!other.pair || !same(std::exp(other.first))) continue;
           const double dw = std::exp(other.first) - w, dz = other.second - ratio;
           const MatrixXd& V = search.fit.covariance;
-          EXPECT_NEAR(mode.natural_frequency_std,
-                      std::hypot(w * std::sqrt(V(at, at) + dw_parts), dw),
+          EXPECT_NEAR(mode.natural_frequency_std, std::hypot(w * std::sqrt(V(at, at)), dw),
                       1e-6 * mode.natural_frequency_std);
-          EXPECT_NEAR(mode.damping_ratio_std,
-                      std::hypot(std::sqrt(V(at + 1, at + 1) + dz_parts), dz),
+          EXPECT_NEAR(mode.damping_ratio_std, std::hypot(std::sqrt(V(at + 1, at + 1)), dz),
                       1e-6 * mode.damping_ratio_std);
           EXPECT_NEAR(mode.covariance, w * V(at, at + 1) + dw * dz,
                       1e-6 * mode.natural_frequency_std * mode.damping_ratio_std);
@@ -396,7 +393,7 @@ TEST(IdentifyDecays, FindsMostModesWhereASearchGotLost) {
       if (known) ++found;
     }
   }
-  EXPECT_GE(found, 9u);  // of 14
+  EXPECT_GE(found, 12u);  // of 14
 }
 
 /// After fast motion there is slow motion whose speed, but not whose size, is lost in noise; digits

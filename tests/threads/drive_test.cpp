@@ -166,8 +166,9 @@ TEST_P(Drive, StopsTheArmBeforeTheTorqueFades) {
   });
   ASSERT_NE(stops, states.end());
   const double way = states.back().joint_position[0] - stops->joint_position[0];
-  const double speed = stops->joint_velocity[0];  // the later this test hears, the more
-  EXPECT_LT(std::abs(way), 0.01 + 0.1 * speed) << "from " << speed << " rad/s";
+  const double speed = stops->joint_velocity[0];
+  if (speed > 0.15) GTEST_SKIP() << kNoPace;  // this test heard of the motion late
+  EXPECT_LT(std::abs(way), 0.02) << "from " << speed << " rad/s";
   double fastest = 0;
   for (const state_t& one : states) {
     const bool fades = one.utime > states.back().utime - 190'000;
@@ -324,7 +325,7 @@ TEST_P(Drive, SendsNumbersToADriverThatReportsNone) {
   } else {
     EXPECT_EQ(fake_status, 0) << fake_said;
   }
-  EXPECT_GE(result["tick_statuses"]["state not finite, torque ramped down"].get<int>(), 2);
+  EXPECT_GE(result["tick_statuses"]["state not finite, torque ramped down"].get<int>(), 10);
   EXPECT_THAT(result["ended"].get<std::string>(), HasSubstr("state not finite"));
   EXPECT_EQ(result["faults"], 1);
 }
