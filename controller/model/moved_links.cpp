@@ -116,11 +116,11 @@ double middle_size(const std::vector<MovedLink>& links) {
   return *middle;
 }
 
-/// What is attached to the tip, and the inertias as a whole, beside the reach of the arm, m.
+/// Doubts a tool, a payload and inertias that are large beside the reach of the arm, m.
 void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, double reach,
                  std::vector<std::string>& warnings) {
   constexpr double kArm = 0.5;     // m: a smaller arm may carry things as large as this
-  constexpr double kMiddle = 0.5;  // of the reach; links have a tenth of it
+  constexpr double kMiddle = 0.5;  // of the reach
   constexpr double kLeast = 1e-3;  // likewise
   const std::string beside = " m, the arm reaches " + figure(reach) + " m: ";
   const auto doubt = [&](const std::string& what, double size, const char* question) {
@@ -147,13 +147,13 @@ void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, d
 void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, double reach,
                   std::vector<std::string>& warnings) {
   constexpr double kTurn = 30;      // rad: five turns, as cables allow
-  constexpr double kSpeed = 20;     // rad/s: twice that of the fastest arms
+  constexpr double kSpeed = 20;     // rad/s
   constexpr double kEffort = 1e4;   // N m
   constexpr int kArm = 4;           // joints that make an arm
   constexpr double kNoLimit = 1e6;  // written where there is none
-  constexpr double kRotors = 0.1;   // of the mass at the reach: five times the published ones
-  constexpr double kBare = 2e-4;    // kg m^2, of a motor without its gear, in an arm that weighs
-  constexpr double kHeavy = 5;      // kg
+  constexpr double kRotors = 0.1;   // of the arm's mass at its reach, in kg m^2
+  constexpr double kBare = 2e-4;    // kg m^2: all rotors are those of motors without their gears
+  constexpr double kHeavy = 5;      // kg: in an arm that weighs so much
   double mass = model.attachment().mass;
   for (const MovedLink& link : links) mass += link.body.body.getMass();
   const auto doubt = [&](const Joint& joint, const std::string& what) {
@@ -167,11 +167,13 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
     warnings.emplace_back(
         "joints: none has a limit of effort (0 is none): limits.torque is 100 N m");
   }
+  const bool bare =
+      mass > kHeavy && model.joint_values(&Joint::reflected_inertia).maxCoeff() < kBare;
   for (const Joint& joint : model.joints()) {
     if (joint.type == JointType::kPrismatic) continue;
     const double rotor = joint.reflected_inertia;
     const bool large = mass > 0 && rotor > kRotors * mass * std::max(1.0, reach * reach);
-    if (large || (rotor > 0 && rotor < kBare && mass > kHeavy)) {
+    if (large || (rotor > 0 && bare)) {
       doubt(joint, "reflected inertia, " + figure(rotor) + " kg m^2, is hardly one of an arm of " +
                        figure(mass) + " kg, " + figure(reach) + " m long: is it " +
                        (large ? "in kg m^2?"

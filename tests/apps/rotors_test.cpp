@@ -29,7 +29,7 @@ TEST(RotorsOfAudit, AreSaidToBeUnknownWithWhatWouldBeEnough) {
   const Numbers enough = found["reflected_inertia_for_margin"];
   std::string list;
   for (const double inertia : enough)
-    list += (list.empty() ? "" : ",") + std::to_string(inertia + 2e-4);
+    list += (list.empty() ? "" : ",") + std::to_string(inertia + 1e-6);
   const Json with = parse(
       run_program(of_panda("audit", joined(kCrisp, {"--json", "--reflected-inertia", list}))));
   EXPECT_GE(with["posture"]["gain_margin"].get<double>(), 2);

@@ -1,5 +1,6 @@
 // URDFs as people have them: newer versions, shapes, limits, inertias and units that are doubtful.
 #include <dashpot/controller/default_settings.hpp>
+#include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
 #include <dashpot/sim/robot.hpp>
@@ -236,9 +237,9 @@ TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
             [](O& o) {
               o.payload = {1, {0, 0, 50}, {}};
             }},
-           {"payload: its mass and inertia are those of a body of 1225 m",
+           {"payload: its mass and inertia are those of a body of 122.5 m",
             [](O& o) {
-              o.payload = {1, {}, 1e6 * Eigen::Matrix3d::Identity()};
+              o.payload = {1, {}, 1e4 * Eigen::Matrix3d::Identity()};
             }},
            {"joint 'panda_joint1': its reflected inertia, 3000 kg m^2, is hardly one of an arm of",
             [](O& o) { o.reflected_inertia.setConstant(7, 3000); }}}) {
@@ -274,9 +275,16 @@ TEST(UrdfForms, SayWhichLimitsDoNotCount) {
                                 HasSubstr("-2.8973 to 2.8973 rad do not count"))));
 }
 
-TEST(UrdfForms, OfSimModelsAreNotDoubted) {
+TEST(UrdfForms, OfSimModelsAreNotDoubtedNorTheirPublishedDrives) {
   for (const testing::Arm& arm : testing::all_arms()) {
-    EXPECT_THAT(testing::arm_model(arm).warnings(), IsEmpty()) << arm.file;
+    const RobotModel model = testing::arm_model(arm);
+    EXPECT_THAT(model.warnings(), IsEmpty()) << arm.file;
+    ModelOptions options;
+    if (const Drives* drives = drives_like(model)) options.drives = drives->name;
+    EXPECT_THAT(RobotModel::from_urdf_file(testing::arm_path(arm.file), arm.base, arm.tip, options)
+                    .warnings(),
+                IsEmpty())
+        << options.drives;
   }
 }
 

@@ -144,7 +144,7 @@ TEST(ConfigRefuses, WithTheLine) {
   }
 }
 
-/// What is in another unit, or off by a zero, would switch a protection off.
+/// A setting in another unit, or off by a zero, would switch a protection off.
 TEST(ConfigRefuses, WhatIsBeyondTheModel) {
   struct Beyond {
     const char* settings;  ///< on line 2
