@@ -30,6 +30,9 @@ struct LoopTiming {
 /// left to the robot, without delay.
 LoopTiming timing_of(const Settings& settings);
 
+/// Gives settings this timing; without a period they keep theirs.
+void set_timing(const LoopTiming& timing, Settings& settings);
+
 /// Returns the loop with this timing, without its gravity where that is ideal.
 analysis::SampledLoop timed(const LoopTiming& timing, analysis::SampledLoop loop);
 

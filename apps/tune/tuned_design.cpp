@@ -111,15 +111,10 @@ TuneJson damping_json(double ratio, const Eigen::MatrixXd& damping) {
 /// Gains and loop as the controller would have them.
 controller::Settings settings_of(const TunedArm& arm, const controller::AuditOptions& stated) {
   controller::Settings settings = arm.settings();
-  if (stated.period > 0) settings.period = stated.period;
+  set_timing(stated, settings);
   settings.watchdog.longest_gap = std::max(settings.watchdog.longest_gap, 2.5 * settings.period);
   settings.motion.smoothing =
       std::min(settings.motion.smoothing, controller::kMostSmoothing * settings.period);
-  settings.analysis.sampled.delay = stated.delay;
-  settings.analysis.sampled.cutoff = stated.cutoff;
-  settings.analysis.sampled.difference_velocity = stated.difference_velocity;
-  settings.integral.time = stated.integral_time;
-  settings.feed_forward.gravity = !stated.ideal_gravity;
   settings.limits.gain_margin = stated.margin;
   settings.initial.mode = stated.mode;
   controller::Gains gains = stated.gains;

@@ -24,6 +24,15 @@ LoopTiming timing_of(const Settings& settings) {
           settings.integral.time, !settings.feed_forward.gravity};
 }
 
+void set_timing(const LoopTiming& timing, Settings& settings) {
+  if (timing.period > 0) settings.period = timing.period;
+  settings.analysis.sampled.delay = timing.delay;
+  settings.analysis.sampled.cutoff = timing.cutoff;
+  settings.analysis.sampled.difference_velocity = timing.difference_velocity;
+  settings.integral.time = timing.integral_time;
+  settings.feed_forward.gravity = !timing.ideal_gravity;
+}
+
 analysis::SampledLoop timed(const LoopTiming& timing, analysis::SampledLoop loop) {
   loop.period = timing.period;
   loop.delay = timing.delay;
