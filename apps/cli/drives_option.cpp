@@ -45,6 +45,11 @@ void warn_of(const controller::RobotModel& model, const controller::Matrix6& tas
   if (!doubt.empty()) print_error("warning: " + doubt);
 }
 
+void warn_of(const controller::Config& config) {
+  warn_of(config.model);
+  warn_of(config.model, config.settings.initial.gains.task_stiffness);
+}
+
 void add_gear_options(CLI::App& command, GearOptions& options) {
   command
       .add_option("--gear-stiffness", options.stiffness,

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/robot_model.hpp>
 
@@ -22,8 +23,10 @@ void take_accepted(const std::string& accepted, controller::ModelOptions& model)
 
 /// Tells people at the terminal what is doubtful about the description of the arm.
 void warn_of(const controller::RobotModel& model);
-/// The same of the stiffness of its task.
+/// Tells people at the terminal if the stiffness of the task seems to have its rotations first.
 void warn_of(const controller::RobotModel& model, const controller::Matrix6& task_stiffness);
+/// Tells people at the terminal what is doubtful about the arm and gains of a configuration.
+void warn_of(const controller::Config& config);
 
 /// What is told of gears that bend; lists of quantities between commas, or one for all joints.
 struct GearOptions {

@@ -179,8 +179,7 @@ void drive(const DriveOptions& options) {
   if (!options.excite.empty()) {
     excitation = read_excitation(options.excite, file.config.settings);
   }
-  warn_of(file.config.model);
-  warn_of(file.config.model, file.config.settings.initial.gains.task_stiffness);
+  warn_of(file.config);
   const PluginLibrary plugin(options.plugin);
   const auto controller = plugin.create(options.config, file.config.model.dof());
   constexpr double kRepeat = 0.1;  // s between two repetitions of a set-point

@@ -167,11 +167,7 @@ void run(const Options& options) {
     excitation = read_excitation(options.excite, scene.arm->config.settings);
   }
   if (options.duration) scene.duration = *options.duration;
-  if (scene.arm) {
-    const controller::Config& config = scene.arm->config;
-    warn_of(config.model);
-    warn_of(config.model, config.settings.initial.gains.task_stiffness);
-  }
+  if (scene.arm) warn_of(scene.arm->config);
   std::optional<PluginLibrary> plugin;
   if (scene.arm) plugin.emplace(options.plugin);
   if (!scene.arm && !options.plugin.empty()) {

@@ -73,7 +73,7 @@ controller::JointVector posture_of(const TuneOptions& options,
 TuneSite make_site(const TuneOptions& options) try {
   if (!options.config.empty()) {
     const controller::Config config = controller::load_config(options.config);
-    warn_of(config.model);
+    warn_of(config);
     TunedArm arm(config.robot, &config.settings);
     const auto design = design_json(arm);
     auto other = design;
