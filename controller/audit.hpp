@@ -1,8 +1,7 @@
 #pragma once
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
-#include <dashpot/controller/base/impedance.hpp>
-#include <dashpot/controller/posture_loop.hpp>
+#include <dashpot/controller/audit_options.hpp>
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -12,34 +11,6 @@
 #include <vector>
 
 namespace dashpot::controller {
-
-/// The gains of a controller and the loop that they act in, as its documentation states them.
-/// Without a period no gain margin is computed, and in it alone an integral counts.
-struct AuditOptions : LoopTiming {
-  Mode mode = Mode::kCartesian;  ///< which of the gains act
-  /// Stiffness and damping as stated. `directions` in it are not read: a direction of the task
-  /// without stiffness and damping is free. Joint matrices and null-space vectors without entries
-  /// count as zero. With a ratio the damping is designed at each posture as Controller does, as
-  /// much as the loop leaves of it with `margin`.
-  Gains gains;
-  /// True if the controller takes the vector part of the error's quaternion, which is half of the
-  /// rotation vector, for its rotational error. The springs then act with half of the stated
-  /// rotational stiffness; the dampers act as stated.
-  bool half_quaternion = false;
-  /// True for operational-space controllers that multiply gains by the tip's inertia, for
-  /// translation and rotation apart: the wrench is blkdiag(L_v, L_w) (K_C e + C_C v) with
-  /// L_v = (J_v M^-1 J_v')^-1, L_w likewise. Stiffness is then in 1/s^2, damping in 1/s, and each
-  /// has one number for the three translations and one for the three rotations.
-  bool inertia_blocks = false;
-  double margin = 2;  ///< gain margin that is asked for, see PostureAudit::rotors; at least 1
-  /// True if the null space's springs and dampers act through the projector N = I - J^+ J of the
-  /// pseudo-inverse, as many controllers have it. It ignores the inertia, so that they act on the
-  /// tip as well. False: through the dynamically consistent one, see NullSpace.
-  bool kinematic_null_space = false;
-  double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
-  /// Range of sampled postures, n, rad; without entries the position limits of the model.
-  JointVector lower, upper;
-};
 
 /// What a posture does to the gains, in three numbers.
 struct PostureNumbers {

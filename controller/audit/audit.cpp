@@ -3,7 +3,6 @@
 #include <dashpot/analysis/null_damping.hpp>
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/audit/stated_gains.hpp>
-#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
@@ -15,7 +14,6 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <utility>
 
 namespace dashpot::controller {
 namespace {
@@ -90,39 +88,6 @@ bool read_eigenvalues(const Eigen::Ref<const Eigen::VectorXcd>& values, double s
   return ratio < kInfinity && slowest <= kRounding * std::abs(fastest);
 }
 
-/// The largest likeness |u^H M v| of two modes' shapes, at most 1.
-double likeness(const MatrixXd& mass, const analysis::Mode<>& a, const analysis::Mode<>& b) {
-  double largest = 0;
-  for (const auto& u : a.shapes) {
-    for (const auto& v : b.shapes) {
-      const double norms = std::sqrt(std::abs(u.dot(mass * u)) * std::abs(v.dot(mass * v)));
-      if (norms > 0) largest = std::max(largest, std::abs(u.dot(mass * v)) / norms);
-    }
-  }
-  return largest;
-}
-
-/// The damping ratios of the modes `with` where those of `without` stand whose shapes are most
-/// alike, the likest pair first; NaN where none is left.
-Eigen::VectorXd paired_ratios(const MatrixXd& mass, const analysis::Spectrum<>& without,
-                              const analysis::Spectrum<>& with) {
-  MatrixXd alike(without.modes.size(), with.modes.size());
-  for (int i = 0; i < without.modes.size(); ++i) {
-    for (int j = 0; j < with.modes.size(); ++j) {
-      alike(i, j) = likeness(mass, without.modes[i], with.modes[j]);
-    }
-  }
-  Eigen::VectorXd ratios = Eigen::VectorXd::Constant(alike.rows(), kNan);
-  for (Index k = std::min(alike.rows(), alike.cols()); k > 0; --k) {
-    Index i = 0, j = 0;
-    alike.maxCoeff(&i, &j);
-    ratios[i] = with.modes[static_cast<int>(j)].damping_ratio;
-    alike.row(i).setConstant(-1);
-    alike.col(j).setConstant(-1);
-  }
-  return ratios;
-}
-
 /// Makes joint springs and dampers of the null space's.
 void take_into_joints(const NullSpace& null_space, Impedance& impedance) {
   const Index n = impedance.null_stiffness.size();
@@ -143,46 +108,11 @@ PostureNumbers numbers_of(const analysis::Spectrum<>& spectrum) {
   return result.numbers;
 }
 
-/// The settings of a controller that designs damping for the ratios of `options`; none without one.
-std::optional<Settings> designed(const RobotModel& model, const AuditOptions& options) {
-  const Gains& gains = options.gains;
-  const bool any = options.mode == Mode::kJoint
-                       ? gains.joint_damping_ratio > 0
-                       : gains.task_damping_ratio > 0 || gains.null_damping_ratio > 0;
-  if (!any) return std::nullopt;
-  require(!options.kinematic_null_space && !options.inertia_blocks && !options.half_quaternion,
-          "damping_ratio: only Dashpot's own law designs damping, with the dynamically consistent "
-          "projector, rotation vectors and gains that are not multiplied by inertia");
-  Settings settings = default_settings(model);
-  if (options.period > 0) settings.period = options.period;
-  settings.limits.gain_margin = options.period > 0 ? options.margin : 1;
-  settings.analysis.sampled.delay = options.delay;
-  settings.analysis.sampled.cutoff = options.cutoff;
-  settings.analysis.sampled.difference_velocity = options.difference_velocity;
-  settings.integral.time = options.integral_time;
-  settings.feed_forward.gravity = !options.ideal_gravity;
-  Gains& wanted = settings.initial.gains;
-  if (options.mode == Mode::kJoint) {
-    const JointMatrix none = JointMatrix::Zero(model.dof(), model.dof());
-    wanted.joint_stiffness = gains.joint_stiffness;
-    wanted.joint_damping = gains.joint_damping.size() > 0 ? gains.joint_damping : none;
-    wanted.joint_damping_ratio = gains.joint_damping_ratio;
-  } else {
-    const auto [stiffness, damping] = std::pair(wanted.joint_stiffness, wanted.joint_damping);
-    wanted = gains;
-    wanted.joint_stiffness = stiffness;
-    wanted.joint_damping = damping;
-  }
-  return settings;
-}
-
 Audit::Audit(const RobotModel& model, const AuditOptions& options)
     : model_(model),
       options_(options),
       arm_(model, options),
-      impedance_(stated_impedance(options.gains,
-                                  {options.mode, options.half_quaternion, options.inertia_blocks},
-                                  model.dof())) {
+      impedance_(stated_impedance(options, model.dof())) {
   const int n = model.dof();
   if (options.mode == Mode::kJoint) {
     springs_ = checked_rank("joint_stiffness", impedance_.joint_stiffness);
@@ -209,7 +139,7 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
   require(options_.lower.size() == n && options_.upper.size() == n &&
               (options_.lower.array() <= options_.upper.array()).all(),
           "lower, upper: need n entries, none of lower above that of upper");
-  designed_ = designed(model, options);
+  designed_ = designing_settings(model, options);
 }
 
 DynamicsResult Audit::evaluate(const JointVector& q) const {
@@ -370,34 +300,6 @@ PostureAudit Audit::audit(const JointVector& q) const {
         integral_decays(sample_loop(system, result.spectrum, loop), loop.period);
   }
   return result;
-}
-
-MissingRotors Audit::missing_rotors(const PostureAudit& found) const {
-  MissingRotors missing;
-  const UnknownRotors unknown = unknown_rotors(model_);
-  if (!unknown.any()) return missing;
-  if (options_.period > 0 && found.numbers.gain_margin >= options_.margin) {
-    missing.inertia = JointVector::Zero(model_.dof());
-  } else if (options_.period > 0) {
-    const analysis::System<> system = at(found.q).system;
-    missing.inertia = enough_reflected_inertia(
-        model_, system, options_.period, [&](const RobotModel& with_rotors) {
-          return Audit(with_rotors, options_).numbers(found.q).gain_margin >= options_.margin;
-        });
-  }
-  if (unknown.published != nullptr) {
-    missing.compared = unknown.published->values(unknown.published->reflected_inertia);
-  } else if (missing.inertia && !missing.inertia->isZero(0)) {
-    missing.compared = *missing.inertia;
-  }
-  if (missing.compared.size() == 0) return missing;
-  const Audit with_rotors(with_at_least(model_, missing.compared), options_);
-  const PostureAudit with = with_rotors.audit(found.q);
-  missing.numbers = with.numbers;
-  MatrixXd mass = with_rotors.evaluate(found.q).M;
-  if (arm_.gears().any()) with_rotors.arm_.gears().extend_mass(mass);
-  missing.damping_ratios = paired_ratios(mass, found.spectrum, with.spectrum);
-  return missing;
 }
 
 JointVector Audit::posture(std::uint64_t seed, std::int64_t index) const {

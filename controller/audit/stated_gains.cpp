@@ -1,4 +1,5 @@
 #include <dashpot/controller/audit/stated_gains.hpp>
+#include <dashpot/controller/default_settings.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
@@ -51,7 +52,8 @@ int checked_rank(const std::string& name, const MatrixXd& stiffness) {
   return static_cast<int>((solver.eigenvalues().array() > rounding).count());
 }
 
-Impedance stated_impedance(const Gains& gains, const StatedGains& stated, int n) {
+Impedance stated_impedance(const AuditOptions& stated, int n) {
+  const Gains& gains = stated.gains;
   Setpoint setpoint;
   setpoint.mode = stated.mode;
   setpoint.gains = gains;
@@ -78,6 +80,26 @@ Impedance stated_impedance(const Gains& gains, const StatedGains& stated, int n)
         !checked.task_stiffness.row(i).isZero(0) || !checked.task_damping.row(i).isZero(0);
   }
   return Impedance(setpoint, n);
+}
+
+std::optional<Settings> designing_settings(const RobotModel& model, const AuditOptions& options) {
+  const Gains& gains = options.gains;
+  const bool any = options.mode == Mode::kJoint
+                       ? gains.joint_damping_ratio > 0
+                       : gains.task_damping_ratio > 0 || gains.null_damping_ratio > 0;
+  if (!any) return std::nullopt;
+  require(!options.kinematic_null_space && !options.inertia_blocks && !options.half_quaternion,
+          "damping_ratio: only Dashpot's own law designs damping, with the dynamically consistent "
+          "projector, rotation vectors and gains that are not multiplied by inertia");
+  Settings settings = default_settings(model);
+  set_timing(options, settings);
+  settings.limits.gain_margin = options.period > 0 ? options.margin : 1;
+  settings.initial.gains = gains;
+  Gains& stated = settings.initial.gains;
+  for (JointMatrix* matrix : {&stated.joint_stiffness, &stated.joint_damping}) {
+    if (matrix->size() == 0) matrix->setZero(model.dof(), model.dof());
+  }
+  return settings;
 }
 
 }  // namespace dashpot::controller

@@ -1,6 +1,7 @@
 #pragma once
-#include <dashpot/controller/base/impedance.hpp>
+#include <dashpot/controller/audit_options.hpp>
 
+#include <optional>
 #include <string>
 
 namespace dashpot::controller {
@@ -12,14 +13,12 @@ void require(bool condition, const std::string& message);
 /// is positive semidefinite.
 int checked_rank(const std::string& name, const Eigen::MatrixXd& stiffness);
 
-/// How a controller means its gains, see AuditOptions.
-struct StatedGains {
-  Mode mode;
-  bool half_quaternion, inertia_blocks;
-};
-
 /// Returns the springs and dampers as stated, in force, for n joints. Throws std::invalid_argument,
 /// with the member's name and the reason.
-Impedance stated_impedance(const Gains& gains, const StatedGains& stated, int n);
+Impedance stated_impedance(const AuditOptions& stated, int n);
+
+/// Returns the settings of a controller that designs damping for the ratios of `options`; none
+/// without a ratio. Throws std::invalid_argument for a law that Controller does not have.
+std::optional<Settings> designing_settings(const RobotModel& model, const AuditOptions& options);
 
 }  // namespace dashpot::controller
