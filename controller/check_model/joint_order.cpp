@@ -3,7 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <map>
 
 namespace dashpot::controller {
 namespace {
@@ -75,45 +75,37 @@ class OrderSearch {
                        run.velocity.middleCols(windows[k].first, size),
                        run.torque.middleCols(windows[k].first, size)});
     }
+    torque_ = WeakForm(part_, how_).torque();
   }
 
   Index joints() const { return how_.rate_noise.size(); }
 
-  double score(const JointOrder& order) const {
-    const auto& [kind, position, torque] = order;
-    const std::vector<SmoothRun> runs = order.apply(part_);
-    const WeakForm form(runs, how_);
-    const MatrixXd tau = form.torque(), velocity = form.velocity();
+  double score(const JointOrder& order) {
+    const Motion& motion = motion_of(order.position);
+    const MatrixXd tau = order.torque.apply(torque_);
     MatrixXd y = tau;
-    if (kind != TorqueKind::kExternal) {
-      const WindowTorques model = form.torques(kernel_, joints());
-      y -= model.inertial;
-      if (kind == TorqueKind::kWhole) y -= model.gravity;
-    }
-    VectorXd v0(joints());
-    for (Index j = 0; j < joints(); ++j) {
-      v0[j] = std::max(1e-9, 3 * how_.rate_noise[position.from[static_cast<std::size_t>(j)]]);
-    }
-    const MatrixXd sign = form.sign(v0);
+    if (order.kind != TorqueKind::kExternal) y -= motion.model.inertial;
+    if (order.kind == TorqueKind::kWhole) y -= motion.model.gravity;
     double sum = 0;
     for (Index j = 0; j < joints(); ++j) {
       constexpr double kLeast = 1e-3;  // better is as good
       const double whole = tau.row(j).squaredNorm();
       if (!(whole > 0)) continue;
-      sum += std::log(std::max(kLeast, left_over(y.row(j).transpose(), sign.row(j).transpose(),
-                                                 velocity.row(j).transpose(), whole)));
+      sum +=
+          std::log(std::max(kLeast, left_over(y.row(j).transpose(), motion.sign.row(j).transpose(),
+                                              motion.velocity.row(j).transpose(), whole)));
     }
     return sum;
   }
 
-  Guess as_it_is(TorqueKind kind) const {
+  Guess as_it_is(TorqueKind kind) {
     const Columns same(joints());
     const JointOrder order{kind, same, same};
     return {order, score(order)};
   }
 
   /// Greedy: the change that helps most, as long as one is far better.
-  Guess improve(Guess guess) const {
+  Guess improve(Guess guess) {
     for (Index round = 0; round < joints(); ++round) {
       Guess best = guess;
       const auto attempt = [&](const auto& change) {
@@ -143,9 +135,38 @@ class OrderSearch {
   }
 
  private:
+  /// What the joints do in the windows, whatever the torques are.
+  struct Motion {
+    WindowTorques model;
+    MatrixXd velocity, sign;
+  };
+
+  /// Nearly all the time goes here: each order of positions is tried with several of torques.
+  const Motion& motion_of(const Columns& position) {
+    std::vector<Index> key = position.from;
+    for (Index j = 0; j < joints(); ++j) {
+      Index& column = key[static_cast<std::size_t>(j)];
+      if (position.sign[j] < 0) column = -1 - column;
+    }
+    const auto [at, is_new] = motions_.try_emplace(key);
+    if (is_new) {
+      const std::vector<SmoothRun> runs =
+          JointOrder{TorqueKind::kWhole, position, Columns(joints())}.apply(part_);
+      const WeakForm form(runs, how_);
+      VectorXd v0(joints());
+      for (Index j = 0; j < joints(); ++j) {
+        v0[j] = std::max(1e-9, 3 * how_.rate_noise[position.from[static_cast<std::size_t>(j)]]);
+      }
+      at->second = {form.torques(kernel_, joints()), form.velocity(), form.sign(v0)};
+    }
+    return at->second;
+  }
+
   DynamicsKernel kernel_;
   RecordFilter how_;
   std::vector<SmoothRun> part_;
+  MatrixXd torque_;  ///< of the windows, as the columns are
+  std::map<std::vector<Index>, Motion> motions_;
 };
 
 /// "the torques fit far better in the order 1, 3, 2", "... with the opposite sign of joint 4".
@@ -215,7 +236,7 @@ std::vector<Index> JointOrder::joints() const {
 
 JointOrder find_order(const RobotModel& model, const std::vector<SmoothRun>& runs,
                       const RecordFilter& how) {
-  const OrderSearch search(model, runs, how);
+  OrderSearch search(model, runs, how);
   Guess best = search.as_it_is(TorqueKind::kExternal);
   for (const TorqueKind kind : {TorqueKind::kWithoutGravity, TorqueKind::kWhole}) {
     const Guess found = search.improve(search.as_it_is(kind));
