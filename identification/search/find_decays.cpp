@@ -23,8 +23,8 @@ constexpr double kRise = 3;    // a new push
 // In periods of the motion's pace: what is slower by a few times still has one envelope.
 constexpr double kStandstill = 1;  // within a motion
 constexpr double kEnvelope = 1.5;  // window
-// Of differences: the first that shows a push. Short ones are those of fast motion, long ones stand
-// out of more noise.
+// Times over which positions are compared, of which the first that shows a push counts: over short
+// ones fast motion shows, over long ones slow motion stands out of more noise.
 constexpr std::array kLags = {0.025, 0.1};
 constexpr Index kLeast = 20;  // samples of a decay
 

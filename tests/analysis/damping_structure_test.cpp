@@ -5,6 +5,7 @@
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
 #include <dashpot/tests/support/refusal.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
@@ -186,6 +187,7 @@ TEST(DesignNearAStart, RefusesOneThatIsNoDamping) {
 
 /// Two joints, two directions: small enough to try all diagonal matrices.
 TEST(LargestSmallestRatio, IsThatOfAnExhaustiveSearch) {
+  DASHPOT_SKIP_IF_QUICK();
   Random random(7306);
   for (int i = 0; i < 4; ++i) {
     const std::vector<TaskImpedance> region = {random_arm(random, 2, 2, 5, 5),
@@ -217,6 +219,7 @@ TEST(LargestSmallestRatio, IsThatOfAnExhaustiveSearch) {
 }
 
 TEST(RegionDesign, RaisesTheWorstRatioAndMapsIt) {
+  DASHPOT_SKIP_IF_QUICK();
   Random random(7307);
   const std::vector<TaskImpedance> region = path_of_configurations(random, 8);
   RegionOptions options;
@@ -258,6 +261,7 @@ TEST(RegionDesign, RaisesTheWorstRatioAndMapsIt) {
 }
 
 TEST(RegionDesign, FindsTheFewOfManyThatBind) {
+  DASHPOT_SKIP_IF_QUICK();
   Random random(7312);
   std::vector<TaskImpedance> region = path_of_configurations(random, 40);
   region[33].mass *= 2.5;  // a payload, not among those that the search begins with

@@ -2,6 +2,7 @@
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/motion_verdict.hpp>
 #include <dashpot/tests/support/dice.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -196,6 +197,7 @@ TEST(MotionKind, DecaysGiveTheSameModesInAnyScale) {
 
 /// Motion under forces, known or not, in other units of time and length, about another mean.
 TEST(MotionKind, ForcedMotionGivesTheSameModesInAnyScale) {
+  DASHPOT_SKIP_IF_QUICK();
   const std::array<double, 2> w{9, 14}, z{0.05, 0.1};
   for (const bool known : {true, false}) {
     std::vector<MeasuredMode> plain;
