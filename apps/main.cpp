@@ -11,8 +11,10 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <memory>
 #include <new>
 #include <numeric>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -91,9 +93,29 @@ std::string meant_option(const CLI::App& command, int argc, char** argv) {
   return "";
 }
 
+/// Help in lines of at most 100 columns.
+class NarrowHelp : public CLI::Formatter {
+ public:
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    constexpr std::size_t kColumns = 100;
+    std::istringstream lines(CLI::Formatter::make_option(option, is_positional));
+    std::string result;
+    for (std::string line; std::getline(lines, line); result += line + "\n") {
+      while (line.size() > kColumns) {
+        const std::size_t at = line.rfind(' ', kColumns);
+        if (at <= get_column_width()) break;  // a long word
+        result.append(line, 0, at).append("\n");
+        line.replace(0, at + 1, get_column_width(), ' ');
+      }
+    }
+    return result;
+  }
+};
+
 int run(int argc, char** argv) {
   CLI::App program("Vibration analysis of second-order systems and impedance-controlled robots",
                    "dashpot");
+  program.formatter(std::make_shared<NarrowHelp>());
   program.set_version_flag("--version", "dashpot " DASHPOT_VERSION);
   program.require_subcommand(0, 1);
   program.footer(kExitStatusHelp);

@@ -267,8 +267,8 @@ void add_drive(CLI::App& program) {
       ->option_text("FILE");
   command->add_flag("--json", options->json, "End with one JSON object instead of a table");
   command->footer(
-      "Read docs/drive.md first; begin with --dry-run. Ctrl-C ends it: the arm "
-      "stops, the torque fades, and the\ndriver then does what it does without commands.\n" +
+      "Read docs/drive.md first; begin with --dry-run. Ctrl-C ends it: the arm stops, the torque "
+      "fades,\nand the driver then does what it does without commands.\n" +
       std::string(kExitStatusHelp));
   command->callback([options] { drive(*options); });
 }

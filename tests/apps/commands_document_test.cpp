@@ -4,7 +4,10 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+#include <cstdio>
 #include <map>
+#include <memory>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -63,6 +66,31 @@ std::map<std::string, std::string> sections() {
 std::set<std::string> options_in(const std::string& text) {
   const std::vector<std::string> found = found_in(text, "(--[a-z]+(-[a-z]+)*)");
   return {found.begin(), found.end()};
+}
+
+TEST(Help, HasNoLineOfMoreThanAHundredColumns) {
+  for (const std::string& names : subcommands()) {
+    const std::string help = run_program({names.substr(0, names.find(',')), "--help"}).out;
+    EXPECT_THAT(lines_in(help, "(.{101,})"), ::testing::IsEmpty()) << names;
+    EXPECT_THAT(help, ::testing::HasSubstr("Print this help message and exit"));
+  }
+}
+
+TEST(Completion, NamesSubcommandsAndTheirOptions) {
+  const auto completed = [](const std::string& words) {
+    const std::string command = std::string("bash -c '. ") + DASHPOT_SOURCE_DIR +
+                                "/apps/completion.bash; COMP_WORDS=(" + DASHPOT_PROGRAM + " " +
+                                words +
+                                "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _dashpot; "
+                                "echo -n \"${COMPREPLY[@]}\"'";
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(popen(command.c_str(), "r"), pclose);
+    std::array<char, 200> text{};
+    text[std::fread(text.data(), 1, text.size() - 1, pipe.get())] = 0;
+    return std::string(text.data());
+  };
+  EXPECT_EQ(completed("i"), "inspect identify");
+  EXPECT_EQ(completed("identify --c"), "--channels --columns --calibrate");
+  EXPECT_EQ(completed("identify recor"), "");  // files are left to bash
 }
 
 TEST(CommandsDocument, ListsEverySubcommand) {
