@@ -166,7 +166,7 @@ void add_check_model(CLI::App& program) {
       std::string(kExitStatusHelp));
   command->callback([options] {
     std::vector<NamedFile> inputs = {{"--config", options->config}};
-    for (const std::string& file : options->files) inputs.push_back({"a record", file});
+    add_records(options->files, inputs);
     check_outputs({{"--write", options->write}}, inputs);
     const Config config = controller::load_config(options->config);
     CheckModelReport report = check_files(*options, config);

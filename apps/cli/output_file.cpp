@@ -1,9 +1,12 @@
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/controller/input_error.hpp>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <system_error>
 
@@ -31,6 +34,16 @@ bool same_file(const NamedFile& one, const NamedFile& other) {
   if (a == b) return true;  // a device too: two writers would mix there
   if (!fs::exists(a, none) && !fs::exists(b, none)) return resolved(a) == resolved(b);
   return fs::is_regular_file(a, none) && fs::equivalent(a, b, none);
+}
+
+/// Whether regular files have the same bytes.
+bool same_bytes(const std::string& one, const std::string& other) {
+  std::error_code none;
+  if (!fs::is_regular_file(one, none) || !fs::is_regular_file(other, none)) return false;
+  if (fs::file_size(one, none) != fs::file_size(other, none)) return false;
+  std::ifstream a(one, std::ios::binary), b(other, std::ios::binary);
+  using Bytes = std::istreambuf_iterator<char>;
+  return std::equal(Bytes(a), Bytes(), Bytes(b), Bytes());
 }
 
 }  // namespace
@@ -66,6 +79,16 @@ void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<Name
       throw InputError(output.what, "is the same file as " + other.what);
     }
     others.push_back(output);
+  }
+}
+
+void add_records(const std::vector<std::string>& files, std::vector<NamedFile>& inputs) {
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!same_bytes(files[i], files[k])) continue;
+      throw InputError(files[i], "is a copy of " + files[k] + ": a record counts once");
+    }
+    inputs.push_back({"a record", files[i]});
   }
 }
 

@@ -41,4 +41,8 @@ struct NamedFile {
 /// names.
 void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs);
 
+/// Adds the records of one experiment to the inputs. Throws InputError, with both names, if one is
+/// a copy of another: what counts twice makes deviations too narrow.
+void add_records(const std::vector<std::string>& files, std::vector<NamedFile>& inputs);
+
 }  // namespace dashpot::apps

@@ -95,7 +95,7 @@ void add_identify(CLI::App& program) {
   command->footer(std::string(kHelp) + kExitStatusHelp);
   command->callback([options] {
     std::vector<NamedFile> inputs = {{"--against", options->against}};
-    for (const std::string& file : options->files) inputs.push_back({"a record", file});
+    add_records(options->files, inputs);
     check_outputs({{"--output", options->output}, {"--plot", options->plot}}, inputs);
     if (!options->plot.empty()) check_plot_name(options->plot);
     const StopSignal signal;

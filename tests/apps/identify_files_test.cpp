@@ -32,9 +32,6 @@ TEST(IdentifyFiles, TakesFilesAsPeopleAndRecordersWriteThem) {
   }
   EXPECT_THAT(found["notes"].dump(), HasSubstr("timestamp is taken to be in us"));
   EXPECT_THAT(found["notes"].dump(), HasSubstr("as they hold text: mode"));
-  const Json both = identify({file, file});
-  EXPECT_EQ(both["records"].size(), 2U);
-  EXPECT_EQ(both["postures"].size(), 1U);
 }
 
 /// Without names, and without a time.
@@ -266,6 +263,7 @@ TEST(IdentifyFiles, RefusesInOneLineThatNamesFileLineAndColumn) {
       {{file(good), "--excited"}, "--excited: needs --inputs"},
       {{file(good), "--channels", "q9"}, "no channel 'q9'; there are q1, q2"},
       {{file(good), "--channels", "q1,q1"}, "'q1' twice"},
+      {{scratch.write("a.csv", good), scratch.write("b.csv", good)}, "b.csv: is a copy of "},
       {{file(good), "--from", "7"}, "0 samples from --from to --to"},
       {{file("time,x\n" + good.substr(good.find('\n') + 1, 3000))}, "columns"},
       {{file(good), file(decay_csv("time,q1,q3", 1))}, "its channels differ"},
