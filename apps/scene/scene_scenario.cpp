@@ -8,6 +8,7 @@
 #include <dashpot/controller/posture.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -53,6 +54,19 @@ void check_limits(const YamlMapping& keys, std::string_view key, const JointVect
   }
 }
 
+/// Throws if a joint would start faster than it may be.
+void check_speeds(const YamlMapping& keys, const Units& velocities, const Scene& scene) {
+  const JointVector& most = scene.arm->config.settings.limits.velocity;
+  for (int i = 0; i < scene.dof(); ++i) {
+    if (std::abs(scene.velocity[i]) <= most[i]) continue;
+    const std::string& unit = velocities[static_cast<std::size_t>(i)];
+    throw keys.error("velocity", "joint " + std::to_string(i + 1) + " would start with " +
+                                     format_number(scene.velocity[i], 3) + " " + unit +
+                                     ", its limit is " + format_number(most[i], 3) + " " + unit +
+                                     ": 'outside_limits: true' lets it");
+  }
+}
+
 /// Throws if the arm would start inside the wall.
 void check_wall(const YamlMapping& keys, std::string_view key, const Scene& scene) {
   const auto& wall = scene.arm->options.wall;
@@ -91,8 +105,9 @@ void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& 
   read_switch(keys, "outside_limits", scene.outside_limits);
   require(keys, "position", scenario, "start");
   read_numbers(keys, "position", positions, kAnyNumber, scene.rest);
-  read_numbers(keys, "velocity", controller::joint_units(scene.arm->config.model, "rad/s", "m/s"),
-               kAnyNumber, scene.velocity);
+  const Units velocities = controller::joint_units(scene.arm->config.model, "rad/s", "m/s");
+  read_numbers(keys, "velocity", velocities, kAnyNumber, scene.velocity);
+  if (!scene.outside_limits) check_speeds(keys, velocities, scene);
   scene.start = scene.rest;
   if (keys.has("joint_displacement") && keys.has("tip_displacement")) {
     throw keys.error("tip_displacement", "stands beside joint_displacement; one of them is enough");

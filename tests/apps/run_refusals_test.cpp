@@ -38,6 +38,9 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
            {"panda", "position: [0, -45 deg", "position: [0, -145 deg",
             "scenario.start.position: joint 'panda_joint2' at -2.53073 rad is outside its limits "
             "-1.7628 to 1.7628 rad (line 63)"},
+           {"panda", "velocity: [0, 0, 0,", "velocity: [0, 20, 0,",
+            "scenario.start.velocity: joint 2 would start with @ rad/s, its limit is @ rad/s: "
+            "'outside_limits: true' lets it (line 66)"},
            {"iiwa14", "    position: [0, 30 deg, 0, -80 deg, 0, 60 deg, 0]\n", "",
             "scenario.start.position: missing (line 20)"},
            {"ur5", "at: 4 s", "at: 1 s",
