@@ -27,9 +27,12 @@ class InvalidSettings : public std::invalid_argument {
 /// in seconds; what it says names the likely unit.
 void validate(const Settings& settings, const RobotModel& model);
 
-/// One line that asks whether the rotations stand first, where the stiffness of the task (6 x 6) is
-/// such that a tip on a lever of twice the arm's reach would turn harder than it moves; else empty.
-std::string doubtful_order(const RobotModel& model, const Matrix6& task_stiffness);
+/// One line that asks about the stiffness and the damping of the task (6 x 6), or an empty one:
+/// whether the rotations stand first, where a tip on a lever of twice the arm's reach would turn
+/// harder than it moves, and whether the damping is a ratio, where one number up to 2 stands for
+/// all directions and leaves a mass of 1 kg a ratio below 0.1.
+std::string doubtful_gains(const RobotModel& model, const Matrix6& stiffness,
+                           const Matrix6& damping);
 
 /// How the brake stops an arm that is as its model: each joint alone from 0.9 of its velocity
 /// limit, with the mass matrix and weight of one posture, rigid gears, and no friction.

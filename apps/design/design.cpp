@@ -291,7 +291,7 @@ void run_design(const DesignOptions& options, OutputFile& csv) try {
       }
     }
     if (const auto& stiffness = file.entries.front().impedance.task_stiffness) {
-      warn_of(*model, *stiffness);
+      warn_of(*model, *stiffness, controller::Matrix6::Zero());
     }
   }
   if (options.region) {

@@ -11,6 +11,7 @@
 #include <numbers>
 #include <sstream>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 namespace dashpot::controller {
@@ -216,13 +217,26 @@ void check_initial(const Setpoint& initial, int n) {
 
 }  // namespace
 
-std::string doubtful_order(const RobotModel& model, const Matrix6& task_stiffness) {
-  const double move = task_stiffness.diagonal().head<3>().maxCoeff();
-  const double turn = task_stiffness.diagonal().tail<3>().maxCoeff();
+std::string doubtful_gains(const RobotModel& model, const Matrix6& stiffness,
+                           const Matrix6& damping) {
   const double lever = 2 * reach_of(kdl_chain(model), model.joints());
-  if (!(move > 0) || turn <= lever * lever * move) return "";
-  return "task stiffness: " + number(turn) + " N m/rad against rotation is much beside " +
-         number(move) + " N/m against translation, which stands first: is the order another?";
+  for (const auto& [name, of, gains] :
+       {std::tuple("stiffness", "N", &stiffness), {"damping", "N s", &damping}}) {
+    const double move = gains->diagonal().head<3>().maxCoeff();
+    const double turn = gains->diagonal().tail<3>().maxCoeff();
+    if (!(move > 0) || turn <= lever * lever * move) continue;
+    return std::string("task ") + name + ": " + number(turn) + " " + of +
+           " m/rad against rotation is much beside " + number(move) + " " + of +
+           "/m against translation, which stands first: is the order another?";
+  }
+  constexpr double kMostRatio = 2, kLeast = 0.1;
+  const double one = damping(0, 0), k = stiffness.diagonal().head<3>().maxCoeff();
+  if (!(one > 0) || one > kMostRatio || damping != one * Matrix6::Identity() ||
+      one >= kLeast * 2 * std::sqrt(k)) {
+    return "";
+  }
+  return "task damping: " + number(one) + " in all directions is little beside a stiffness of " +
+         number(k) + " N/m: is it a damping ratio?";
 }
 
 void validate(const Settings& settings, const RobotModel& model) {

@@ -59,6 +59,23 @@ TEST(Mistakes, InWhatGoesTogetherAreNamed) {
                  "--seed");
 }
 
+TEST(Mistakes, InGainsOfTheTaskAreAskedAbout) {
+  const auto said = [](const std::string& stiffness, const std::string& damping) {
+    const Outcome done =
+        run_program(of_panda("audit", {"--stiffness", stiffness, "--damping", damping}));
+    EXPECT_EQ(done.status, 0) << done.err;
+    return done.err;
+  };
+  EXPECT_EQ(said("200,200,200,20,20,20", "20,20,20,2,2,2"), "");
+  EXPECT_EQ(said("200,200,200,20,20,20", "3,3,3,3,3,3"), "");
+  EXPECT_THAT(said("200,200,200,20,20,20", "0.7,0.7,0.7,0.7,0.7,0.7"),
+              ::testing::HasSubstr("task damping: 0.7 in all directions is little beside"));
+  EXPECT_THAT(said("20,20,20,2000,2000,2000", "20,20,20,2,2,2"),
+              ::testing::HasSubstr("task stiffness: 2000 N m/rad against rotation is much"));
+  EXPECT_THAT(said("200,200,200,20,20,20", "2,2,2,300,300,300"),
+              ::testing::HasSubstr("task damping: 300 N s m/rad against rotation is much"));
+}
+
 TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
   const Words audit = joined(of_panda("audit", kStiffness), {"--damping-factor", "2"});
   const Words design = joined(of_panda("design", kStiffness), {"--damping-ratio"});
