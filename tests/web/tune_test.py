@@ -369,7 +369,19 @@ class Tune(unittest.TestCase):
         self.value("dashpot.store.edit((state) => { state.a.stiffness[0] = -5; }, true)")
         self.browser.until("document.getElementById('refused').textContent.includes('task_stiffness')")
         self.assertFalse(self.value("document.querySelector('#gains [data-key=stiffness] input').disabled"))
+        self.assertEqual(self.value("getComputedStyle(document.getElementById('rows')).opacity"), '0.35')  # they are of another design
         self.edit("state.a.stiffness[0] = 300")
+        self.assertEqual(self.value("getComputedStyle(document.getElementById('rows')).opacity"), '1')
+
+    def test_proposes_damping_of_the_wanted_ratio(self):
+        for name, full in (('Propose a matrix', True), ('Propose a diagonal', False)):
+            self.edit("state.a.damping = [1, 1, 1, 1, 1, 1]")
+            self.value(f"[...document.querySelectorAll('#gains button')].find((b) => b.textContent == '{name}').click()")
+            self.browser.until("JSON.stringify(dashpot.store.state.a.damping) != '[1,1,1,1,1,1]'")
+            self.settle()
+            self.assertEqual(self.value("Array.isArray(dashpot.store.state.a.damping[0])"), full)
+            self.assertAlmostEqual(self.value('dashpot.answers.a.smallest_ratio'), 0.7, delta=2e-3)
+            self.assertLess(self.value('Math.max(...dashpot.answers.a.modes.map((mode) => mode.damping_ratio))'), 0.702 if full else 5)
 
     def test_texts_that_are_no_numbers_are_marked(self):
         def shown(selector):

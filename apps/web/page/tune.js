@@ -78,6 +78,22 @@ const all = attend($('q'), {wanted: `${setup.q.length} numbers in ${[...new Set(
   return true;
 }});
 $('q').parentElement.append(all.note);
+/// Takes the damping of the wanted ratio at this posture: the matrix for all modes, or a diagonal whose smallest ratio it is.
+async function propose(key, full) {
+  const name = store.state.edited, ratio = wanted();
+  const ask = (damping) => post(setup.token, '/design', JSON.stringify({q: store.state.q, place: store.state.place, design: {...store.design(name), [key]: damping}}));
+  const round = (x) => Number(x.toPrecision(6));
+  let found = await ask({ratio}), damping = found.error ? null : found.gains.damping;
+  for (let turn = 0; damping && !full && turn < 8; ++turn) {
+    const diagonal = turn ? damping.map((x) => x * ratio / found.smallest_ratio) : damping.map((line, i) => line[i]);
+    found = await ask(diagonal);
+    damping = found.error || !(found.smallest_ratio > 0) ? null : diagonal;
+    if (damping && Math.abs(found.smallest_ratio - ratio) < 1e-3) break;
+  }
+  page.problem[name] = damping ? '' : found.error || 'damping: no diagonal gives the ratio';
+  if (damping) edit((state) => { state[name][key] = damping.map((x) => (full ? x.map(round) : round(x))); }, true);
+  else redraw('texts');
+}
 function build() {
   const key = `${store.state.edited} ${structure(design())}`;
   if (key === built) return;
@@ -86,7 +102,7 @@ function build() {
     const asked = page.asked[store.state.edited];  // the springs may have been others
     return answer() && asked.design.mode === design().mode ? answer().gains.damping : null;
   };
-  const groups = {gains: gainFields(edit, design, setup.arm, acting), loop: loopFields(edit, design), parts: partFields(edit, design, setup)};
+  const groups = {gains: gainFields(edit, design, setup.arm, acting, propose), loop: loopFields(edit, design), parts: partFields(edit, design, setup)};
   fields = Object.values(groups).flat();
   for (const [id, group] of Object.entries(groups)) $(id).replaceChildren(...group.map((field) => field.element));
 }
@@ -253,6 +269,7 @@ function tell() {
   $('limits').textContent = kDesigns.flatMap((name) => loopWords(name.toUpperCase(), answer(name))).map((text) => `${text}.`).join(' ');
   const different = armDifference();
   $('arms').textContent = different.length ? `A and B are on different arms: ${different.join(', ')}.` : '';
+  document.body.classList.toggle('old', kDesigns.some((name) => page.problem[name]));
   tellRefused();
   tellChips();
   tellArrows();

@@ -12,8 +12,9 @@ export function structure(design) {
     kindOf(design.joint_damping), kindOf(design.null_damping)].join();
 }
 
-/// Stiffness and damping of task or joints. `acting` returns the matrix of damping that acts, or null.
-function pair(edit, design, {stiffness, damping, names, units, acting}) {
+/// Stiffness and damping of task or joints. `acting` returns the matrix of damping that acts, or null;
+/// `propose` takes damping of the wanted ratio.
+function pair(edit, design, {stiffness, damping, names, units, acting, propose}) {
   const fields = [], n = names.length;
   const full = Array.isArray(design()[stiffness][0]);
   fields.push(choice(edit, {label: 'stiffness', key: `${stiffness}_kind`, options: [['diagonal', 'diagonal'], ['full', 'full matrix']],
@@ -31,6 +32,7 @@ function pair(edit, design, {stiffness, damping, names, units, acting}) {
       const now = acting() || rows(Array(n).fill(0)), clean = now.map((row) => row.map((x) => Number(x.toPrecision(6))));
       design()[damping] = {ratio: {ratio: 0.7}, factor: {factor: 2}, diagonal: diagonal(clean), full: clean}[kind];
     }}));
+  fields.push(button('Propose a diagonal', () => propose(damping, false)), button('Propose a matrix', () => propose(damping, true)));
   const kind = kindOf(design()[damping]);
   if (kind === 'ratio' || kind === 'factor') {
     fields.push(slider(edit, {label: kind, key: damping, unit: kind === 'ratio' ? '' : '√kg', low: kind === 'ratio' ? 0.05 : 0, high: kind === 'ratio' ? 2 : 6,
@@ -45,16 +47,16 @@ function pair(edit, design, {stiffness, damping, names, units, acting}) {
 }
 
 /// Fields of the gains. `design` returns the design that is edited, `arm` is the chain.
-export function gainFields(edit, design, arm, acting) {
+export function gainFields(edit, design, arm, acting, propose) {
   const n = arm.joints.length, joint = design().mode === 'joint', rest = () => design().null_stiffness;
   const fields = [choice(edit, {label: 'springs', key: 'mode', options: [['cartesian', 'at the tip'], ['joint', 'in the joints']],
     get: () => design().mode, set: (x) => { design().mode = x; }})];
   if (joint) {
     const unit = (i) => (arm.joints[i].prismatic ? ['N/m', 1, 1e5, 'N s/m', 1e4] : ['N m/rad', 0.1, 1e4, 'N m s/rad', 300]);
-    return fields.concat(pair(edit, design, {stiffness: 'joint_stiffness', damping: 'joint_damping', names: arm.joints.map((_, i) => String(i + 1)), units: unit, acting}));
+    return fields.concat(pair(edit, design, {stiffness: 'joint_stiffness', damping: 'joint_damping', names: arm.joints.map((_, i) => String(i + 1)), units: unit, acting, propose}));
   }
   const unit = (i) => (i < 3 ? ['N/m', 1, 1e4, 'N s/m', 1000] : ['N m/rad', 0.1, 1000, 'N m s/rad', 100]);
-  fields.push(...pair(edit, design, {stiffness: 'stiffness', damping: 'damping', names: kTask, units: unit, acting}));
+  fields.push(...pair(edit, design, {stiffness: 'stiffness', damping: 'damping', names: kTask, units: unit, acting, propose}));
   fields.push(choice(edit, {label: 'axes', key: 'frame', options: [['base', 'of the base'], ['tool', 'of the tool']], get: () => design().frame || 'base', set: (x) => { design().frame = x; }}));
   fields.push(choice(edit, {label: 'rotation error', key: 'rotation', options: [['vector', 'rotation vector'], ['half-quaternion', 'part of a quaternion: half of it']],
     get: () => design().rotation || 'vector', set: (x) => { design().rotation = x; }}));
