@@ -87,9 +87,9 @@ def pairs(frequency, ratio):
 
 
 def check_modes(log, end, mass, stiffness, damping, friction, motion):
-    """The last modes before the row `end` against Drake's mass matrix and its arm's motion."""
+    """The last modes before `end`, us of the arm's time, against Drake's mass matrix and its motion."""
     modes, sampled = log["DASHPOT_MODES"], log["DASHPOT_SAMPLED_MODES"]
-    last = np.flatnonzero(modes["tick"] <= end)[-1]
+    last = np.flatnonzero(modes["utime"] < end)[-1]
     n = len(stiffness)
     inverse = np.linalg.inv(mass)
     continuous = np.linalg.eigvals(np.block(
@@ -98,7 +98,7 @@ def check_modes(log, end, mass, stiffness, damping, friction, motion):
     published = np.ravel(modes["eigenvalue_real"][last] + 1j * modes["eigenvalue_imag"][last])
     np.testing.assert_allclose(published, nearest(continuous, published), rtol=1e-5)
 
-    last = np.flatnonzero(sampled["tick"] <= end)[-1]
+    last = np.flatnonzero(sampled["utime"] < end)[-1]
     frequency, ratio = sampled["natural_frequency"][last], sampled["damping_ratio"][last]
     moved = np.reshape(nearest(motion, pairs(frequency, ratio)), (n, 2))
     fitted = np.sqrt(moved.prod(axis=1))
@@ -109,7 +109,7 @@ def check_modes(log, end, mass, stiffness, damping, friction, motion):
 @pytest.mark.parametrize("kind", ARMS)
 def test_modes_are_those_of_drakes_arm(kind, program, tmp_path):
     pytest.importorskip("pydrake", reason="Drake is not installed")
-    from drake_arm import DrakeArm, eigenvalues
+    from drake_arm import PERIOD, DrakeArm, eigenvalues
     model, base, start, cutoff, stiffness, damping, friction = ARMS[kind]
     config, log, says = (tmp_path / name for name in ("drive.yaml", "drive.lcm", "says"))
     # Constant damping, and the friction that Drake's arm has. The clock of commands is that of the
@@ -133,10 +133,9 @@ def test_modes_are_those_of_drakes_arm(kind, program, tmp_path):
             if not arm.begin():
                 assert "no status on" in says.read_text(), says.read_text()
                 pytest.skip(f"multicast does not work on this machine: {url}")
-            began = len(arm.rows)
             for gains in ((stiffness, damping), changed):
                 rows = tapped(arm, stiffness, random)
-                found.append((len(arm.rows) - began, arm.mass(), *gains,
+                found.append((1e6 * PERIOD * len(arm.rows), arm.mass(), *gains,
                               eigenvalues(rows, differenced=kind == "iiwa")))
                 if gains is changed:
                     break
