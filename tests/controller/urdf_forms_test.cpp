@@ -235,11 +235,13 @@ TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
             }},
            {"is payload.center in m?",
             [](O& o) {
-              o.payload = {1, {0, 0, 50}, {}};
+              o.payload.mass = 1;
+              o.payload.center = {0, 0, 50};
             }},
            {"payload: its mass and inertia are those of a body of 122.5 m",
             [](O& o) {
-              o.payload = {1, {}, 1e4 * Eigen::Matrix3d::Identity()};
+              o.payload.mass = 1;
+              o.payload.inertia = 1e4 * Eigen::Matrix3d::Identity();
             }},
            {"joint 'panda_joint1': its reflected inertia, 3000 kg m^2, is hardly one of an arm of",
             [](O& o) { o.reflected_inertia.setConstant(7, 3000); }}}) {
