@@ -413,7 +413,7 @@ def test_is_as_exact_as(rival):
 def test_finds_modes_of_these_records():
     pytest.importorskip("scipy")
     decays, shaken, moved = (compare(kind, range(number)) for kind, number in
-                             [("decays", 20), ("ambient", 20), ("excited", 6)])
+                             [("decays", 12), ("ambient", 6), ("excited", 2)])
     assert decays.found >= 0.95 * decays.modes and shaken.found >= 0.8 * shaken.modes
     assert moved.found >= 0.95 * moved.modes
     assert np.all(np.median(moved.both[:, 2], axis=0) < 5e-4)
