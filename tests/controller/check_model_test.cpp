@@ -218,6 +218,11 @@ TEST(CheckModel, NamesExchangedColumnsAndWrongSigns) {
   EXPECT_THAT(check.joints[3].suspicious, HasSubstr("turned around"));
   EXPECT_EQ(check.joints[0].suspicious, "");
   record = right;
+  record.position.row(3) *= -1;
+  check = check_model(panda(), {record});
+  EXPECT_THAT(check.order,
+              ElementsAre("the positions of joint 4 fit far better with the opposite sign"));
+  record = right;
   record.torque.row(1).swap(record.torque.row(3));
   check = check_model(panda(), {record});
   EXPECT_THAT(check.order, ElementsAre("the columns of torques fit far better in the order 1, 4, "
