@@ -2,6 +2,7 @@
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
 #include <gmock/gmock.h>
@@ -117,6 +118,7 @@ TEST(RegionOfAnArm, IsOfThePosturesThatAreAskedFor) {
 }
 
 TEST(RegionOfAnArm, SaysWhatBindsWhereTheAnswerMissesWhatWasAsked) {
+  DASHPOT_SKIP_IF_QUICK();
   const Words wide = {"--region", "--samples", "8", "--keep-structure", "diagonal"};
   const Outcome little = ask_panda("design", kSprings, wide);
   EXPECT_EQ(little.status, 1);

@@ -6,6 +6,7 @@
 #include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -63,6 +64,7 @@ LoopLimit random_limit(const TaskImpedance& arm, Random& random, int seed) {
 }
 
 TEST(DampingInLoop, SettlesWithTheMarginThatItClaimsAndNoMore) {
+  DASHPOT_SKIP_IF_QUICK();
   int kept = 0, lowered = 0, given_up = 0;
   for (int seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));

@@ -141,6 +141,7 @@ TEST_P(ArmStability, TurnsWhereTheAnalysisSays) {
 /// Soft joints of a Panda with its rotors. The torque against gravity comes late and feeds motion,
 /// so that the joints need more damping than in a loop with ideal gravity.
 TEST(LoopStability, LateGravityTakesDamping) {
+  DASHPOT_SKIP_IF_QUICK();
   const testing::TwinModels twin(testing::arms()[0], false);
   JointVector K(7), D(7), q0(7);
   K << 60, 60, 60, 60, 10, 10, 10;
