@@ -60,10 +60,10 @@ void check_speeds(const YamlMapping& keys, const Units& velocities, const Scene&
   for (int i = 0; i < scene.dof(); ++i) {
     if (std::abs(scene.velocity[i]) <= most[i]) continue;
     const std::string& unit = velocities[static_cast<std::size_t>(i)];
-    throw keys.error("velocity", "joint " + std::to_string(i + 1) + " would start with " +
-                                     format_number(scene.velocity[i], 3) + " " + unit +
-                                     ", its limit is " + format_number(most[i], 3) + " " + unit +
-                                     ": 'outside_limits: true' lets it");
+    std::string said = "joint " + std::to_string(i + 1) + " would start with ";
+    said.append(format_number(scene.velocity[i], 3)).append(" ").append(unit);
+    said.append(", its limit is ").append(format_number(most[i], 3)).append(" ").append(unit);
+    throw keys.error("velocity", said + ": 'outside_limits: true' lets it");
   }
 }
 
