@@ -75,8 +75,8 @@ Json check(const Words& arguments) {
 TEST(CheckModelProgram, TellsFrictionAndPayloadOfAFile) {
   const Scratch scratch;
   const std::string config = panda_config(scratch);
-  const std::string file =
-      scratch.write("a.csv", csv(numbered("q"), 1, numbered("tau_J_"), kInOrder));
+  const std::string text = csv(numbered("q"), 1, numbered("tau_J_"), kInOrder);
+  const std::string file = scratch.write("a.csv", text);
   const Json found = check({file, "--config", config});
   EXPECT_EQ(found["torques"], "whole");
   ASSERT_EQ(found["joints"].size(), 7U);
@@ -93,7 +93,8 @@ TEST(CheckModelProgram, TellsFrictionAndPayloadOfAFile) {
   EXPECT_NEAR(found["payload"]["center"][2].get<double>(), 0.05, 0.01);
   EXPECT_TRUE(found["payload"]["determined"].get<bool>());
   EXPECT_THAT(found["order"].dump(), "[]");
-  const Outcome table = run_program({"check-model", file, file, "--config", config});
+  const std::string other = scratch.write("b.csv", text + "\n");  // no copy
+  const Outcome table = run_program({"check-model", file, other, "--config", config});
   EXPECT_EQ(table.status, 0);
   EXPECT_THAT(table.out, HasSubstr("panda_joint7"));
   EXPECT_THAT(table.out, HasSubstr("Payload: 1."));

@@ -32,6 +32,10 @@ TEST(IdentifyFiles, TakesFilesAsPeopleAndRecordersWriteThem) {
   }
   EXPECT_THAT(found["notes"].dump(), HasSubstr("timestamp is taken to be in us"));
   EXPECT_THAT(found["notes"].dump(), HasSubstr("as they hold text: mode"));
+  const std::string shorter = stamps.substr(0, stamps.rfind('\n', stamps.size() - 2) + 1);
+  const Json both = identify({file, scratch.write("shorter", shorter)});
+  EXPECT_EQ(both["records"].size(), 2U);
+  EXPECT_EQ(both["postures"].size(), 1U);
 }
 
 /// Without names, and without a time.

@@ -113,8 +113,12 @@ TEST(Progress, OfAnIdentificationIsABarAndCtrlCLeavesTheModesFoundUntilThen) {
     }
     text += "," + std::to_string(force) + "\n";
   }
-  const std::string file = scratch.write("shaken.csv", text);
-  const Outcome outcome = interrupted({"identify", file, file, file, file, "--inputs", "force"});
+  Words words = {"identify", "--inputs", "force"};
+  for (int k = 0; k < 4; ++k) {  // no record is a copy of another
+    text += "\n";
+    words.push_back(scratch.write("shaken" + std::to_string(k) + ".csv", text));
+  }
+  const Outcome outcome = interrupted(words);
   EXPECT_EQ(outcome.status, 130);
   EXPECT_THAT(outcome.err, HasSubstr("\r\033[K["));
   EXPECT_THAT(outcome.err, HasSubstr("the modes above are those found until then"));
