@@ -178,7 +178,7 @@ void add_loop_options(CLI::App& command, controller::LoopTiming& timing) {
       .add_option("--delay", timing.delay, "Ticks from a command to its effect, beyond the hold")
       ->check([](const std::string& text) -> std::string {
         const bool whole = text.find_first_not_of("0123456789") == std::string::npos;
-        return whole && text.size() < 4 && std::stoi(text) <= 100
+        return whole && !text.empty() && text.size() < 4 && std::stoi(text) <= 100
                    ? ""
                    : "a whole number of ticks from 0 to 100 is wanted, not '" + text + "'";
       })

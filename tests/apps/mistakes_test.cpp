@@ -93,6 +93,7 @@ TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
   EXPECT_EQ(run_program(joined(audit, {"--payload", "0.8"})).err, "");
   expect_refusal(run_program(joined(audit, {"--period", "1ms", "--delay", "2ms"})),
                  "--delay: a whole number of ticks from 0 to 100 is wanted, not '2ms'");
+  expect_refusal(run_program(joined(audit, {"--delay", ""})), "from 0 to 100 is wanted, not ''");
   const Outcome fast = run_program(of_panda("inspect", {"--qd", "30,20,20,20,0,0,0"}));
   EXPECT_THAT(fast.err, ::testing::HasSubstr("joint 'panda_joint1' is faster than its limit, 2.1"));
   const Outcome turned = run_program(
