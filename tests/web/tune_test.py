@@ -382,6 +382,12 @@ class Tune(unittest.TestCase):
             self.assertEqual(self.value("Array.isArray(dashpot.store.state.a.damping[0])"), full)
             self.assertAlmostEqual(self.value('dashpot.answers.a.smallest_ratio'), 0.7, delta=2e-3)
             self.assertLess(self.value('Math.max(...dashpot.answers.a.modes.map((mode) => mode.damping_ratio))'), 0.702 if full else 5)
+            self.edit("state.a.damping = [1, 1, 1, 1, 1, 1]; state.q = [0, 0, 0, -0.07, 0, 1.5708, 0]")  # stretched
+            self.value(f"[...document.querySelectorAll('#gains button')].find((b) => b.textContent == '{name}').click()")
+            self.browser.until("dashpot.problem.a.includes('singular')")
+            self.assertEqual(self.value('dashpot.store.state.a.damping'), [1] * 6)
+            self.assertEqual(self.value("getComputedStyle(document.getElementById('rows')).opacity"), '1')  # of this design
+            self.edit("state.q = [...dashpot.setup.q]")
 
     def test_texts_that_are_no_numbers_are_marked(self):
         def shown(selector):

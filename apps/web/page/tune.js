@@ -12,7 +12,7 @@ import {kFormats} from '/tune_text.js';
 const $ = (id) => document.getElementById(id);
 const kDesigns = ['a', 'b'], kColours = {a: 'accent', b: 'force'};
 const kAxes = ['x', 'y', 'z', 'rx', 'ry', 'rz'];
-const page = window.dashpot = {errors: [], answers: {a: null, b: null}, problem: {a: '', b: ''}, asked: {a: null, b: null}, chosen: null, timing: [], poles: []};
+const page = window.dashpot = {errors: [], answers: {a: null, b: null}, problem: {a: '', b: ''}, old: {a: false, b: false}, asked: {a: null, b: null}, chosen: null, timing: [], poles: []};
 window.addEventListener('error', (e) => page.errors.push(e.message));
 window.addEventListener('unhandledrejection', (e) => page.errors.push(String(e.reason)));
 
@@ -44,6 +44,7 @@ const kTogether = 15;  // ms
 let later = 0;
 const questions = Object.fromEntries(kDesigns.map((name) => [name, new Newest(setup.token, (heard, asked) => {
   page.problem[name] = heard.error || '';
+  page.old[name] = !!heard.error;
   $('link').textContent = heard.gone ? heard.error : '';
   $('link').className = 'badge bad';
   if (!heard.error) page.answers[name] = heard;
@@ -83,14 +84,16 @@ async function propose(key, full) {
   const name = store.state.edited, ratio = wanted();
   const ask = (damping) => post(setup.token, '/design', JSON.stringify({q: store.state.q, place: store.state.place, design: {...store.design(name), [key]: damping}}));
   const round = (x) => Number(x.toPrecision(6));
-  let found = await ask({ratio}), damping = found.error ? null : found.gains.damping;
+  let found = await ask({ratio});
+  const singular = found.error ? '' : (found.refused.find(({key}) => key === 'q') || {reason: ''}).reason;
+  let damping = found.error || singular ? null : found.gains.damping;
   for (let turn = 0; damping && !full && turn < 8; ++turn) {
     const diagonal = turn ? damping.map((x) => x * ratio / found.smallest_ratio) : damping.map((line, i) => line[i]);
     found = await ask(diagonal);
     damping = found.error || !(found.smallest_ratio > 0) ? null : diagonal;
     if (damping && Math.abs(found.smallest_ratio - ratio) < 1e-3) break;
   }
-  page.problem[name] = damping ? '' : found.error || 'damping: no diagonal gives the ratio';
+  page.problem[name] = damping ? '' : singular || found.error || 'damping: no diagonal gives the ratio';
   if (damping) edit((state) => { state[name][key] = damping.map((x) => (full ? x.map(round) : round(x))); }, true);
   else redraw('texts');
 }
@@ -269,7 +272,7 @@ function tell() {
   $('limits').textContent = kDesigns.flatMap((name) => loopWords(name.toUpperCase(), answer(name))).map((text) => `${text}.`).join(' ');
   const different = armDifference();
   $('arms').textContent = different.length ? `A and B are on different arms: ${different.join(', ')}.` : '';
-  document.body.classList.toggle('old', kDesigns.some((name) => page.problem[name]));
+  document.body.classList.toggle('old', kDesigns.some((name) => page.old[name]));
   tellRefused();
   tellChips();
   tellArrows();
