@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
-#include <dashpot/controller/audit_options.hpp>
+#include <dashpot/controller/audit/audit_options.hpp>
 
 #include <Eigen/Core>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// What rotors would change that a model does not know.
+// Audit::missing_rotors: what an audit would find with the rotors that a model lacks.
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/rotors.hpp>
 

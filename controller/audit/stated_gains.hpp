@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/audit_options.hpp>
+#include <dashpot/controller/audit/audit_options.hpp>
 
 #include <optional>
 #include <string>

@@ -80,7 +80,7 @@ inline const std::vector<Room>& rooms() {
        {"posture_loop", "rotors", "elastic_joints"},
        {kAnalysis, kText, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
       {"controller/core", 5, {"controller"}, {kAnalysis, kEigen}},
-      {"controller/audit", 5, {"audit", "audit_options", "gain_judge"}, {kAnalysis, kEigen}},
+      {"controller/audit", 5, {"audit", "gain_judge"}, {kAnalysis, kEigen}},
       {"controller/check_model", 5, {"check_model", "torque_record"}, {kText, kEigen, "kdl/"}},
       {"controller/config", 6, {"config"}, {kEigen}},
       {"controller/plugin", 7, {"plugin"}, {kAnalysis, kEigen, "stdint.h"}},  // plugin.h is C
