@@ -135,7 +135,8 @@ class OrderSearch {
   }
 
  private:
-  /// What the joints do in the windows, whatever the torques are.
+  /// The means over the windows that an order of positions gives: torques of the model, velocities
+  /// and their signs.
   struct Motion {
     WindowTorques model;
     MatrixXd velocity, sign;

@@ -258,9 +258,8 @@ void validate(const Settings& settings, const RobotModel& model) {
     const double distance = wall.distance(Eigen::Vector3d::Zero());
     if (limits.beyond_model || std::abs(distance) <= far) continue;
     fail("limits.walls", std::abs(distance), "m",
-         "from the base, farther than the arm reaches; is its point in mm? limits.beyond_model: "
-         "true "
-         "accepts it");
+         "from the base, farther than the arm reaches; is its point in mm? "
+         "limits.beyond_model: true accepts it");
   }
   const Watchdog& watchdog = settings.watchdog;
   if (watchdog.setpoint_damp > 0 && watchdog.setpoint_damp < watchdog.setpoint_hold) {
