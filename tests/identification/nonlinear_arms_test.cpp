@@ -1,12 +1,11 @@
 // Arms that rub, or whose springs change with their stretch: the deviations have to hold the modes
-// of the linear arm.
+// of the linear arm. `./run stress identify rubbing` and `stiffening` try more arms.
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -14,41 +13,11 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::Dice;
+using testing::Flaw;
 using testing::sensed;
 using testing::SprungArm;
-
-constexpr double kReach = 0.02;  // rad
-
-/// A joint differs from a linear one in this.
-struct Flaw {
-  double friction = 0;   ///< Coulomb's, as a share of the spring's force at kReach
-  double hardening = 0;  ///< share by which a spring is stiffer at kReach
-};
-
-/// How an arm moves from `position` at rest, n x samples 1 ms apart.
-MatrixXd released(const SprungArm& arm, const Flaw& flaw, const VectorXd& position, int samples) {
-  constexpr int kParts = 10;
-  constexpr double kStep = 1e-3 / kParts, kSticks = 1e-3;  // s, rad/s
-  const MatrixXd &C = arm.system.damping, &K = arm.system.stiffness;
-  const Eigen::LLT<MatrixXd> mass(arm.system.mass);
-  const VectorXd rubs = flaw.friction * kReach * K.diagonal();
-  VectorXd q = position, v = VectorXd::Zero(q.size());
-  MatrixXd motion(q.size(), samples);
-  for (int i = 0; i < samples; ++i) {
-    motion.col(i) = q;
-    for (int k = 0; k < kParts; ++k) {
-      const VectorXd stretched = q.array() * (1 + flaw.hardening * (q / kReach).array().square());
-      const VectorXd force =
-          K * stretched + C * v + rubs.cwiseProduct(VectorXd((v / kSticks).array().tanh()));
-      v -= kStep * mass.solve(force);
-      q += kStep * v;
-    }
-  }
-  return motion;
-}
 
 struct Tally {
   int modes = 0, found = 0, frequency_inside = 0, ratio_inside = 0;
@@ -63,8 +32,8 @@ Tally compare(const Flaw& flaw, int arms, unsigned long seed) {
     std::vector<MotionRecord> records;
     for (int r = 0; r < 3; ++r) {
       VectorXd start(arm.system.mass.rows());
-      for (double& q : start) q = kReach * draw.normal();
-      records.push_back(sensed(released(arm, flaw, start, 1500), 1e-3, {}, draw));
+      for (double& q : start) q = Flaw::kReach * draw.normal();
+      records.push_back(sensed(arm.release(flaw, start, 1500), 1e-3, {}, draw));
     }
     const Identification found = identify_decays(records);
     tally.modes += static_cast<int>(arm.modes.size());

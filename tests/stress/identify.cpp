@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstdio>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 namespace {
@@ -74,11 +75,15 @@ Motions chirps(const SprungArm& arm, int inputs, Dice& draw) {
 }
 
 /// The energy of a release is in the springs; the shares are those of the last one.
-Motions releases(const SprungArm& arm, int count, Eigen::VectorXd start, Dice& draw) {
+Motions releases(const SprungArm& arm, int count, const std::optional<Flaw>& flaw,
+                 Eigen::VectorXd start, Dice& draw) {
+  constexpr int kSamples = 1500;
   Motions result;
   for (int r = 0; r < count; ++r) {
     for (Eigen::Index i = 0; r > 0 && i < start.size(); ++i) start[i] = 0.02 * draw.normal();
-    result.records.push_back(sensed(arm, start, 1500, 0.001, {}, draw));
+    const Eigen::MatrixXd motion =
+        flaw ? arm.release(*flaw, start, kSamples) : arm.release(start, kSamples, 0.001);
+    result.records.push_back(sensed(motion, 0.001, {}, draw));
   }
   const auto& M = arm.system.mass;
   for (const auto& mode : arm.modes) {
@@ -160,18 +165,21 @@ bool identify(const Request& request) {
   const std::string& kind = request.kind;
   if (kind == "arms") return dashpot::stress::identify_arms(request);
   const bool ambient = kind == "shaken", driven = kind.starts_with("chirp");
-  const int records = kind == "triples" ? 3 : kind == "chirp-pairs" ? 2 : 1;
+  std::optional<Flaw> flaw;
+  if (kind == "rubbing") flaw = {.friction = 0.005, .hardening = 0};
+  if (kind == "stiffening") flaw = {.friction = 0, .hardening = 0.02};
+  const int records = kind == "triples" || flaw ? 3 : kind == "chirp-pairs" ? 2 : 1;
   std::printf("%ld cases, seed %lu\n", request.whole(), request.seed);
   Tallies tallies;
   const auto begin = std::chrono::steady_clock::now();
   for (long k = 0; k < request.whole(); ++k) {
     Dice draw(1'000'003 * request.seed + static_cast<std::uint64_t>(k));
-    const SprungArm arm(static_cast<std::size_t>(k), draw, 0.05, 0.9);
+    const SprungArm arm(static_cast<std::size_t>(k), draw, flaw ? 0.03 : 0.05, flaw ? 0.3 : 0.9);
     Eigen::VectorXd start(arm.system.mass.rows());
     for (double& q : start) q = 0.02 * draw.normal();
     const Motions motions = driven    ? chirps(arm, records, draw)
                             : ambient ? shaken(arm, draw)
-                                      : releases(arm, records, start, draw);
+                                      : releases(arm, records, flaw, start, draw);
     try {
       const Identification result =
           driven    ? dashpot::identification::identify_excited(motions.records)
@@ -203,6 +211,8 @@ const dashpot::stress::AddPart part(
      "CASES",
      {{500, 12, "releases", "a release from about 0.02 rad, 1.5 s at 1 kHz"},
       {50, 4, "triples", "three of them"},
+      {20, 2, "rubbing", "three of lightly damped arms whose joints rub"},
+      {20, 2, "stiffening", "three of lightly damped arms whose springs stiffen"},
       {50, 2, "shaken", "two minutes of random torques, about 0.01 rad, at 500 Hz"},
       {20, 4, "chirps", "a chirp of torques, 0.3 to 12 Hz in 10 s at 1 kHz, about 0.02 rad"},
       {36, 1, "arms",

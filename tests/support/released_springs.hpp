@@ -16,6 +16,13 @@
 
 namespace dashpot::testing {
 
+/// A joint differs from a linear one in this.
+struct Flaw {
+  static constexpr double kReach = 0.02;  ///< rad
+  double friction = 0;                    ///< Coulomb's, as a share of the spring's force at kReach
+  double hardening = 0;                   ///< share by which a spring is stiffer at kReach
+};
+
 /// An arm near an equilibrium, with springs and dampers in its joints, linearized.
 struct SprungArm {
   analysis::System<> system;
@@ -74,6 +81,28 @@ struct SprungArm {
     for (int i = 0; i < samples; ++i) {
       const Eigen::VectorXcd turned = (solver.eigenvalues() * (i * period)).array().exp();
       motion.col(i) = (solver.eigenvectors().topRows(n) * turned.cwiseProduct(weights)).real();
+    }
+    return motion;
+  }
+
+  /// How it moves with flawed joints from `position` at rest, n x samples 1 ms apart.
+  Eigen::MatrixXd release(const Flaw& flaw, const Eigen::VectorXd& position, int samples) const {
+    constexpr int kParts = 10;
+    constexpr double kStep = 1e-3 / kParts, kSticks = 1e-3;  // s, rad/s
+    const Eigen::MatrixXd &C = system.damping, &K = system.stiffness;
+    const Eigen::LLT<Eigen::MatrixXd> mass(system.mass);
+    const Eigen::VectorXd rubs = flaw.friction * Flaw::kReach * K.diagonal();
+    Eigen::VectorXd q = position, v = Eigen::VectorXd::Zero(q.size());
+    Eigen::MatrixXd motion(q.size(), samples);
+    for (int i = 0; i < samples; ++i) {
+      motion.col(i) = q;
+      for (int k = 0; k < kParts; ++k) {
+        const Eigen::VectorXd stretched =
+            q.array() * (1 + flaw.hardening * (q / Flaw::kReach).array().square());
+        const Eigen::VectorXd slips = (v / kSticks).array().tanh();
+        v -= kStep * mass.solve(K * stretched + C * v + rubs.cwiseProduct(slips));
+        q += kStep * v;
+      }
     }
     return motion;
   }
