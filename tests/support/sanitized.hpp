@@ -28,15 +28,3 @@ inline bool quick() {
 #define DASHPOT_SKIP_IF_QUICK()    \
   if (::dashpot::testing::quick()) \
   GTEST_SKIP() << "takes long; the tests beside it run the same code"
-
-/// 1 under the thread sanitizer, which makes a loop slower than 1 kHz leaves time for.
-#if defined(__SANITIZE_THREAD__)
-#define DASHPOT_THREAD_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(thread_sanitizer)
-#define DASHPOT_THREAD_SANITIZED 1
-#endif
-#endif
-#ifndef DASHPOT_THREAD_SANITIZED
-#define DASHPOT_THREAD_SANITIZED 0
-#endif

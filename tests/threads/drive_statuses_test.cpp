@@ -103,7 +103,7 @@ class DriveStatuses : public ::testing::TestWithParam<Arm> {
  protected:
   /// Drivers keep a pace of 1 kHz.
   void SetUp() override {
-    if (DASHPOT_THREAD_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
+    if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
     if (!writer.until_answered()) GTEST_SKIP() << kNoMulticast;
   }
   double greatest_torque() const { return writer.commands.back().torque.cwiseAbs().maxCoeff(); }

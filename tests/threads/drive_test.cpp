@@ -24,7 +24,7 @@ class Drive : public ::testing::TestWithParam<Arm> {
  protected:
   /// Drivers keep a pace of 1 kHz.
   void SetUp() override {
-    if (DASHPOT_THREAD_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
+    if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
   }
   std::vector<std::string> driver(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words = {"fake-driver", scene(std::string("drivers/") + arm.name),
@@ -450,7 +450,7 @@ TEST(DriveOfAnIiwa, RefusesSpringsOfKukas) {
 
 /// Springs of KUKA's that commands lead to where the arm is hold nothing, and damp.
 TEST(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
-  if (DASHPOT_THREAD_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
   // So small that the simulated loop, whose springs act from period to period, bears them.
   const std::string springs = "[1000, 1000, 1000, 500, 100, 20, 5]";  // N m/rad
   const std::string dampers = "[4, 4, 2, 2, 0.3, 0.1, 0.01]";         // N m s/rad
@@ -519,7 +519,7 @@ TEST(DriveOfAPanda, WaitsForTheNextDriverAfterOneThatDied) {
 }
 
 TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
-  if (DASHPOT_THREAD_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
   const std::string url = own_url();
   Listener listener(url);
   Running fake({"fake-driver", scene("drivers/panda"), "--panda", "--lcm-url", url, "--lock-step",
