@@ -5,6 +5,7 @@
 #include <dashpot/lcmtypes/log_file.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/places.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/threads/live_run.hpp>
 
 #include <gtest/gtest.h>
@@ -29,6 +30,14 @@ inline constexpr Arm kIiwa = {"iiwa14", "--iiwa", lcmtypes::DriverKind::kIiwa};
 inline constexpr Arm kPanda = {"panda", "--panda", lcmtypes::DriverKind::kPanda};
 inline constexpr Arm kIiwa7 = {"iiwa7", "--iiwa", lcmtypes::DriverKind::kIiwa};
 inline constexpr Arm kFr3 = {"fr3", "--panda", lcmtypes::DriverKind::kPanda};
+
+/// Two programs keep a pace of 1 kHz, which sanitizers leave no time for.
+class AtPace : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
+  }
+};
 
 inline void PrintTo(const Arm& arm, std::ostream* out) {
   *out << arm.name;

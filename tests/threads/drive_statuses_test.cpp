@@ -99,11 +99,11 @@ class StatusWriter {
   std::vector<std::uint8_t> bytes_;
 };
 
-class DriveStatuses : public ::testing::TestWithParam<Arm> {
+class DriveStatuses : public AtPace, public ::testing::WithParamInterface<Arm> {
  protected:
-  /// Drivers keep a pace of 1 kHz.
   void SetUp() override {
-    if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
+    AtPace::SetUp();
+    if (IsSkipped()) return;
     if (!writer.until_answered()) GTEST_SKIP() << kNoMulticast;
   }
   double greatest_torque() const { return writer.commands.back().torque.cwiseAbs().maxCoeff(); }

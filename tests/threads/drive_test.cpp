@@ -20,12 +20,8 @@ namespace {
 using lcmtypes::DriverKind;
 using ::testing::HasSubstr;
 
-class Drive : public ::testing::TestWithParam<Arm> {
+class Drive : public AtPace, public ::testing::WithParamInterface<Arm> {
  protected:
-  /// Drivers keep a pace of 1 kHz.
-  void SetUp() override {
-    if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
-  }
   std::vector<std::string> driver(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words = {"fake-driver", scene(std::string("drivers/") + arm.name),
                                       arm.option,    "--lcm-url",
@@ -184,6 +180,8 @@ TEST_P(Drive, StopsTheArmBeforeTheTorqueFades) {
 
 /// Other arms behind the same drivers.
 class DriveToo : public Drive {};
+using DriveOfAnIiwa = AtPace;
+using DriveOfAPanda = AtPace;
 TEST_P(DriveToo, HoldsTheArmAndMovesItWhereItIsTold) {
   hold_and_move();
 }
@@ -396,7 +394,7 @@ void watch(std::vector<Watched>& all) {
 
 /// Gains that Drake's iiwa bears at 1 ms, rings with at 5 ms, and does not bear with more damping
 /// of the wrist. No driver runs: they are judged before the first status.
-TEST(DriveOfAnIiwa, JudgesGainsForThePeriod) {
+TEST_F(DriveOfAnIiwa, JudgesGainsForThePeriod) {
   const Scratch scratch;
   struct Judged {
     const char *period, *wrist;
@@ -423,7 +421,7 @@ TEST(DriveOfAnIiwa, JudgesGainsForThePeriod) {
   }
 }
 
-TEST(DriveOfAnIiwa, RefusesSpringsOfKukas) {
+TEST_F(DriveOfAnIiwa, RefusesSpringsOfKukas) {
   const Scratch scratch;
   const std::string stiff = changed_configuration(
       scratch, kIiwa,
@@ -449,8 +447,7 @@ TEST(DriveOfAnIiwa, RefusesSpringsOfKukas) {
 }
 
 /// Springs of KUKA's that commands lead to where the arm is hold nothing, and damp.
-TEST(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
-  if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
+TEST_F(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
   // So small that the simulated loop, whose springs act from period to period, bears them.
   const std::string springs = "[1000, 1000, 1000, 500, 100, 20, 5]";  // N m/rad
   const std::string dampers = "[4, 4, 2, 2, 0.3, 0.1, 0.01]";         // N m s/rad
@@ -492,7 +489,7 @@ TEST(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
   }
 }
 
-TEST(DriveOfAPanda, WaitsForTheNextDriverAfterOneThatDied) {
+TEST_F(DriveOfAPanda, WaitsForTheNextDriverAfterOneThatDied) {
   const std::string url = own_url();
   const std::vector<std::string> words = {"fake-driver", scene("drivers/panda"), "--panda",
                                           "--lcm-url", url};
@@ -518,8 +515,7 @@ TEST(DriveOfAPanda, WaitsForTheNextDriverAfterOneThatDied) {
   EXPECT_GE(result["statuses"]["awaited"].get<int>(), 100);
 }
 
-TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
-  if (DASHPOT_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
+TEST_F(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
   const std::string url = own_url();
   Listener listener(url);
   Running fake({"fake-driver", scene("drivers/panda"), "--panda", "--lcm-url", url, "--lock-step",
