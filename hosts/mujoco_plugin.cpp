@@ -268,7 +268,6 @@ class Arm {
 };
 
 Arm* arm_of(const mjData* data, int instance) {
-  // NOLINTNEXTLINE(performance-no-int-to-ptr): MuJoCo keeps it so
   return reinterpret_cast<Arm*>(data->plugin_data[instance]);
 }
 

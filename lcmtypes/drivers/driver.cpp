@@ -111,7 +111,7 @@ bool decode(DriverKind kind, const void* data, std::size_t size, DriverStatus& s
   status.velocity = joints(message.joint_velocity);
   status.torque = joints(message.joint_torque);
   status.external = joints(message.joint_torque_external);
-  status.robot_mode = message.robot_mode;  // NOLINT(bugprone-signed-char-misuse): a number
+  status.robot_mode = message.robot_mode;
   status.success_rate = message.control_command_success_rate;
   return true;
 }
@@ -143,7 +143,6 @@ bool decode(DriverKind kind, const void* data, std::size_t size, DriverCommand& 
   command.utime = message.utime;
   command.position = joints(message.joint_position);
   command.torque = joints(message.joint_torque);
-  // NOLINTNEXTLINE(bugprone-signed-char-misuse): a number
   command.control_mode = message.control_mode_expected;
   return true;
 }
