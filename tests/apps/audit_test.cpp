@@ -2,6 +2,7 @@
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/places.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <cmath>
 #include <cstdlib>
@@ -216,6 +217,7 @@ TEST(Audit, RefusesInOneLineThatNamesTheOption) {
 }
 
 TEST(AuditTable, IsPrintedForEachPreset) {
+  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   const std::string line = "cd " + DASHPOT_SOURCE_DIR " && python3 apps/plots/audit.py " +
                            DASHPOT_PROGRAM + " 20 >" + scratch.path("out") + " 2>&1";

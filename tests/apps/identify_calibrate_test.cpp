@@ -150,6 +150,7 @@ TEST(Calibrate, CalibratesAPayloadWithItsCenterAndInertia) {
 
 /// An arm of two joints whose gears bend: by four releases at two postures.
 TEST(Calibrate, FindsTheStiffnessOfGears) {
+  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   const auto link = [](const std::string& name, const std::string& center,
                        const std::string& mass) {

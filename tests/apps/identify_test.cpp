@@ -1,6 +1,7 @@
 // `dashpot identify`: what a user sees.
 #include <dashpot/tests/apps/identify_run.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 namespace dashpot::tests {
 namespace {
@@ -77,6 +78,7 @@ TEST(Identify, FindsModesOfAmbientMotion) {
 }
 
 TEST(Identify, SaysFirstWhatARecordShows) {
+  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   const auto record = [&](const std::string& name, double size, auto motion) {
     std::string text = "time [s],q1 [rad],force [N]\n";

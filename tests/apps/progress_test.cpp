@@ -86,6 +86,7 @@ TEST(Progress, OfAnAuditIsABarAndCtrlCLeavesWhatWasDone) {
 }
 
 TEST(Progress, OfARegionSaysThatThereIsNothingYet) {
+  DASHPOT_SKIP_IF_QUICK();
   const Outcome outcome =
       interrupted(joined(of_panda("design", kTaskStiffness),
                          {"--damping-ratio", "0.7", "--region", "--samples", "20000"}));

@@ -228,6 +228,7 @@ TEST(Run, SimulatesTheRobotThatTheControllerIsTold) {
 
 /// Whose sensors are on the links, has the links where it is told to start; otherwise the motors.
 TEST(Run, SimulatesGearsThatBend) {
+  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   const auto energy_of = [&](const std::string& robot) {
     const std::string file = changed(

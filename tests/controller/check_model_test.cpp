@@ -193,6 +193,7 @@ TEST(CheckModel, LeavesOutAContact) {
 }
 
 TEST(CheckModel, SaysWhichPartOfTheModelTheTorquesContain) {
+  DASHPOT_SKIP_IF_QUICK();
   RecordedArm arm = loaded_panda();
   EXPECT_EQ(check_model(panda(), {arm.record(6)}).kind, TorqueKind::kWhole);
   arm.without_gravity = true;
@@ -255,6 +256,7 @@ RobotDescription with_mass(const tests::Scratch& scratch, const std::string& lin
 }
 
 TEST(CheckModel, NamesAWrongLinkAndAMissingRotor) {
+  DASHPOT_SKIP_IF_QUICK();
   const tests::Scratch scratch;
   RecordedArm arm = loaded_panda();
   arm.description.options.payload = {};

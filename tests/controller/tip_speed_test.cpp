@@ -1,5 +1,6 @@
 // Limits of the tip's speed that are lowered while the loop runs.
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/support/simulated_arm.hpp>
 
 #include <gtest/gtest.h>
@@ -42,6 +43,7 @@ TEST(TipSpeed, IsOnlyEverLowered) {
 
 /// The reference of the joint mode is as slow as that of the tip, on the way and while it changes.
 TEST(TipSpeed, SlowsTheJointModeToo) {
+  DASHPOT_SKIP_IF_QUICK();
   Settings settings = testing::quiet_settings(testing::panda_model());
   settings.initial.mode = Mode::kJoint;
   testing::SimulatedArm arm(testing::panda_model(), settings, testing::panda_ready());

@@ -6,6 +6,7 @@
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/elastic_loop.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -176,6 +177,7 @@ TEST(ElasticArm, BecomesTheRigidOneAsItsGearsStiffen) {
 }
 
 TEST(ElasticArm, MovesAlikeWithAllIntegrators) {
+  DASHPOT_SKIP_IF_QUICK();
   const auto end_of = [](const IntegratorOptions& integrator) {
     ArmOptions arm_options;
     arm_options.wrenches = {{0.0053, 0.0108, 5 * Vector6::Ones()}};

@@ -2,6 +2,7 @@
 // the simulated arm under the real controller. dashpot_stress elastic modes draws hundreds of
 // loops.
 #include <dashpot/tests/support/elastic_prediction.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +12,7 @@ namespace dashpot {
 namespace {
 
 TEST(ElasticPrediction, IsWhatTheSimulatedLoopDoes) {
+  DASHPOT_SKIP_IF_QUICK();
   testing::ElasticDifference worst;
   int bounded = 0, unstable = 0, links = 0;
   constexpr int kLoops = 24;

@@ -1,6 +1,7 @@
 // Integral action and friction compensation at the measured velocity, on simulated arms: what is
 // left of a steady error, what a held arm does when it is let go, and where the energy goes.
 #include <dashpot/tests/support/released_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -141,6 +142,7 @@ TEST(SteadyError, IsSmallerWithEachOfTheTwo) {
 /// The weight of a payload that the model lacks lowers the tip by m g / k, and with the integral,
 /// which takes the weight over, it comes back.
 TEST(SteadyError, OfAnUntoldPayloadGoesToZero) {
+  DASHPOT_SKIP_IF_QUICK();
   constexpr double kMass = 0.5, kStiffness = 400, kSlow = 1;
   RoughPanda plain(0, kMass), integral(0, kMass);
   for (RoughPanda* panda : {&plain, &integral}) panda->hold_tip(kStiffness, 50, 30, 4);
@@ -197,6 +199,7 @@ TEST(HeldArm, IsNotThrownWhenLetGo) {
 
 /// The torque that compensates friction is what two controllers differ by.
 TEST(FrictionCompensation, GivesLessThanFrictionTakes) {
+  DASHPOT_SKIP_IF_QUICK();
   struct Sensors {
     const char* name;
     double velocity_noise, resolution;
