@@ -96,7 +96,7 @@ Table numbers_at(const RobotAudit& all, const Eigen::MatrixXd& postures) {
   return to_table(numbers);
 }
 
-nb::dict to_dict(const Distribution& found) {
+nb::dict distribution_dict(const Distribution& found) {
   nb::dict result;
   result["median"] = found.median;
   result["p05"] = found.p05;
@@ -120,9 +120,9 @@ nb::dict summarize(const RobotAudit& all, const Table& table, std::uint64_t seed
   nb::dict result;
   result["samples"] = found.samples;
   result["singular"] = found.singular;
-  result["smallest_ratio"] = to_dict(found.smallest_ratio);
-  result["fastest_pole"] = to_dict(found.fastest_pole);
-  result["gain_margin"] = to_dict(found.gain_margin);
+  result["smallest_ratio"] = distribution_dict(found.smallest_ratio);
+  result["fastest_pole"] = distribution_dict(found.fastest_pole);
+  result["gain_margin"] = distribution_dict(found.gain_margin);
   return result;
 }
 

@@ -14,7 +14,7 @@ using identification::MotionRecord;
 
 namespace {
 
-nb::dict modes_of(const std::vector<MeasuredMode>& modes) {
+nb::dict measured_modes_of(const std::vector<MeasuredMode>& modes) {
   const auto column = [&](auto member) {
     return to_column(modes, [=](const MeasuredMode& mode) { return mode.*member; });
   };
@@ -85,8 +85,8 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
                                           : identify_decays(records, options);
   }
   nb::dict result;
-  result["modes"] = modes_of(found.modes);
-  result["rejected"] = modes_of(found.rejected);
+  result["modes"] = measured_modes_of(found.modes);
+  result["rejected"] = measured_modes_of(found.rejected);
   result["parts"] = to_list(parts, [](const std::array<double, 3>& part) {
     return nb::make_tuple(static_cast<int>(part[0]), part[1], part[2]);
   });

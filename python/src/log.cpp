@@ -25,23 +25,23 @@ using lcmtypes::LogFile;
 
 /// The number that an array of arrays of numbers is made of, and how deep it lies.
 template <class Value>
-struct Numbers {
+struct NestedNumbers {
   using Type = Value;
   static constexpr std::size_t kDepth = 0;
 };
 template <class Value, std::size_t Size>
-struct Numbers<Value[Size]> : Numbers<Value> {  // NOLINT: as lcm-gen writes them
-  static constexpr std::size_t kDepth = 1 + Numbers<Value>::kDepth;
+struct NestedNumbers<Value[Size]> : NestedNumbers<Value> {  // NOLINT: as lcm-gen writes them
+  static constexpr std::size_t kDepth = 1 + NestedNumbers<Value>::kDepth;
 };
 template <class Value>
-struct Numbers<std::vector<Value>> : Numbers<Value> {
-  static constexpr std::size_t kDepth = 1 + Numbers<Value>::kDepth;
+struct NestedNumbers<std::vector<Value>> : NestedNumbers<Value> {
+  static constexpr std::size_t kDepth = 1 + NestedNumbers<Value>::kDepth;
 };
 
 /// Enlarges shape[Depth], shape[Depth + 1], ... to what `value` needs.
 template <std::size_t Depth, class Shape, class Value>
 void grow(Shape& shape, const Value& value) {
-  if constexpr (Numbers<Value>::kDepth > 0) {
+  if constexpr (NestedNumbers<Value>::kDepth > 0) {
     shape[Depth] = std::max(shape[Depth], std::size(value));
     for (const auto& item : value) grow<Depth + 1>(shape, item);
   }
@@ -50,8 +50,8 @@ void grow(Shape& shape, const Value& value) {
 /// Writes `value`, whose sizes are at most shape[Depth], shape[Depth + 1], ..., to its place.
 template <std::size_t Depth, class Number, class Shape, class Value>
 void write(Number* place, const Shape& shape, const Value& value) {
-  if constexpr (Numbers<Value>::kDepth == 0) {
-    *place = static_cast<Number>(value);  // NOLINT(bugprone-signed-char-misuse): a number
+  if constexpr (NestedNumbers<Value>::kDepth == 0) {
+    *place = static_cast<Number>(value);
   } else {
     std::size_t step = 1;
     for (std::size_t i = Depth + 1; i < shape.size(); ++i) step *= shape[i];
@@ -71,9 +71,9 @@ class Columns {
   /// Adds a field. Where sizes differ, what is missing is NaN, or -1 in arrays of integers.
   template <class Field>
   void operator()(const char* name, Field Message::*field) {
-    constexpr bool kReal = std::is_floating_point_v<typename Numbers<Field>::Type>;
+    constexpr bool kReal = std::is_floating_point_v<typename NestedNumbers<Field>::Type>;
     using Number = std::conditional_t<kReal, double, std::int64_t>;
-    std::array<std::size_t, 1 + Numbers<Field>::kDepth> shape{messages_.size()};
+    std::array<std::size_t, 1 + NestedNumbers<Field>::kDepth> shape{messages_.size()};
     for (const Message& message : messages_) grow<1>(shape, message.*field);
     constexpr Number kMissing = kReal ? std::numeric_limits<Number>::quiet_NaN() : Number(-1);
     std::size_t step = 1;  // from message to message

@@ -49,7 +49,7 @@ DynamicsResult dynamics(const Robot& robot, const Eigen::VectorXd& q, const Opti
   return result;
 }
 
-Eigen::MatrixXd pose(const Robot& robot, const Eigen::VectorXd& q) {
+Eigen::MatrixXd tip_pose(const Robot& robot, const Eigen::VectorXd& q) {
   const DynamicsResult at = dynamics(robot, q, {});
   Eigen::MatrixXd T_BT = Eigen::MatrixXd::Identity(4, 4);
   T_BT.topLeftCorner(3, 3) = at.R_BT;
@@ -168,7 +168,7 @@ void add_robot(nb::module_& m) {
       .def("warnings", [](const Robot& robot) { return robot.model.warnings(); })
       .def("missing_rotors",
            [](const Robot& robot) { return controller::missing_rotors_text(robot.model); })
-      .def("pose", &pose)
+      .def("pose", &tip_pose)
       .def("mass",
            [](const Robot& robot, const Vector& q) { return to_array(dynamics(robot, q, {}).M); })
       .def("gravity", [](const Robot& robot,
