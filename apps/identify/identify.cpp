@@ -60,6 +60,10 @@ void add_identify(CLI::App& program) {
                  "The wrench of the excitation in a log moved the arm; without it only if it "
                  "changes all the time")
       ->excludes(ambient);
+  command->add_flag(
+      "--large-motion", options->large_motion,
+      "Take motion of more than 0.5 rad for linear: where the moved inertia stays, as "
+      "that of a lone joint does");
   command
       ->add_option("--from", options->from,
                    "Begin of a free decay, or of what is used, s of the file's time")

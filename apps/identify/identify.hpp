@@ -24,6 +24,7 @@ struct IdentifyCommand {
   int order = 0;
   bool ambient = false;
   bool excited = false;
+  bool large_motion = false;  ///< is taken for linear
   bool json = false;
   std::optional<LogExcitation> excitation = {};
   /// Told the share that is done; true ends the search with what there is.

@@ -190,7 +190,7 @@ class PartsReader {
   /// Returns what a record shows; where that has no modes, the report says why.
   MotionKind kind_of(const MotionRecord& record, bool driven, const std::vector<bool>& free) {
     const identification::MotionVerdict verdict = identification::judge_motion(record);
-    const bool large = is_large(record, report_.channels);
+    const bool large = !command_.large_motion && is_large(record, report_.channels);
     parts_.large = parts_.large || large;
     MotionKind kind = verdict.kind;
     if (kind == MotionKind::kNothing) {

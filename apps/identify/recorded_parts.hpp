@@ -9,7 +9,7 @@ namespace dashpot::apps {
 
 inline constexpr const char* kLargeAdvice =
     "joints move so far that the arm's inertia changes: one posture, and pushes or excitation of "
-    "some hundredths of a radian, tell modes";
+    "some hundredths of a radian, tell modes; --large-motion takes it all the same";
 
 /// A part of a file with what was measured in it.
 struct RecordedPart {

@@ -109,7 +109,11 @@ TEST(Identify, SaysFirstWhatARecordShows) {
     }
     return now;
   };
-  EXPECT_EQ(verdict("pendulum.csv", 1, pendulum, {})["verdict"], "large motion");
+  const std::string far = record("pendulum.csv", 1, pendulum);
+  EXPECT_THAT(no_modes({far})["advice"].dump(), HasSubstr("--large-motion takes it"));
+  const Json taken = no_modes({far, "--large-motion"});
+  EXPECT_EQ(taken["verdict"], "decay");
+  EXPECT_THAT(taken["notes"].dump(), HasSubstr("change with the size of the motion"));
   const auto spring = [](double t) { return std::exp(-0.15 * t) * std::cos(5 * t); };
   const Json linear = identify({record("spring.csv", 1.2, spring)});
   EXPECT_EQ(linear["verdict"], "decay");
