@@ -66,7 +66,7 @@ void add_identify(CLI::App& program) {
       "that of a lone joint does");
   command
       ->add_option("--from", options->from,
-                   "Begin of a free decay, or of what is used, s of the file's time")
+                   "Begin of a free decay, or of what is used, s after the file's first sample")
       ->option_text("S");
   command->add_option("--to", options->to, "End of it, s")->option_text("S");
   command

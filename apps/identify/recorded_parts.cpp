@@ -149,7 +149,9 @@ class PartsReader {
     while (command_.to && last > first && all.time[last - 1] > *command_.to) --last;
     if (last - first < 20) {
       throw InputError(
-          path, std::to_string(last - first) + " samples from --from to --to, need 20 or more");
+          path,
+          std::to_string(last - first) +
+              " samples from --from to --to, s after the file's first sample; need 20 or more");
     }
     const MotionRecord chosen_part = part_of(all, first, last);
     const MotionKind kind = kind_of(chosen_part, driven, file.free);
