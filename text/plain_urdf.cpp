@@ -165,6 +165,7 @@ class PlainWriter {
         write_attribute(name, value);
       }
     }
+    if (tag.depth == 2 && tag.name == "origin") note_turn(value_of(tag, "rpy"));
     const bool limit = tag.depth == 2 && tag.name == "limit";
     if (limit) complete(tag);
     text.append(tag.ends ? "/>" : ">");
@@ -174,6 +175,15 @@ class PlainWriter {
   void write_attribute(std::string_view name, std::string_view value) {
     const char* quote = value.find('"') == std::string_view::npos ? "\"" : "'";
     result_.text.append(" ").append(name).append("=").append(quote).append(value).append(quote);
+  }
+
+  void note_turn(std::string_view rpy) {
+    constexpr double kTurn = 6.3;  // rad
+    std::array<double, 3> angles{};
+    if (part_ == "joint" && read_numbers(rpy, angles) &&
+        std::any_of(angles.begin(), angles.end(), [](double a) { return std::abs(a) > kTurn; })) {
+      result_.turns.emplace(part_name_, rpy);
+    }
   }
 
   std::string rotation(const XmlTag& tag, std::string_view value) const {

@@ -22,6 +22,8 @@ struct PlainUrdf {
   /// By joint, what its limit lacks though URDF asks for it: "effort", "velocity" or both, which
   /// are 0 in `text`.
   std::map<std::string, std::string, std::less<>> lacks;
+  /// By joint, the `rpy` of its origin where an angle is beyond a turn, as degrees are.
+  std::map<std::string, std::string, std::less<>> turns;
 };
 
 /// Checks a URDF of version 1.0, 1.1 or 1.2 as check_xml does, and returns it in version 1.0 with

@@ -293,6 +293,17 @@ void doubt_limits(const std::vector<urdf::JointConstSharedPtr>& path,
   }
 }
 
+/// Names the joints whose places are turned by more than a turn.
+void doubt_turns(const std::vector<urdf::JointConstSharedPtr>& path, const UrdfTree& tree,
+                 std::vector<std::string>& warnings) {
+  for (const urdf::JointConstSharedPtr& joint : path) {
+    const auto found = tree.turns.find(joint->name);
+    if (found == tree.turns.end()) continue;
+    warnings.push_back(one_line("joint '" + joint->name + "': its origin's rpy is " +
+                                found->second + " rad, beyond a turn: is it in degrees?"));
+  }
+}
+
 /// What is wrong with the inertias of links before the first moving joint, which nothing depends
 /// on.
 void doubt_base(const urdf::ModelInterface& tree, const std::string& base,
@@ -379,6 +390,7 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
   check_links(moved, options, data->chain, name, data->warnings);
   doubt_base(*tree, base, path, data->warnings);
   doubt_limits(path, data->warnings);
+  doubt_turns(path, read, data->warnings);
   const KDL::Chain bare = data->chain;
   data->attach(attachment);
   data->joints = std::move(joints);

@@ -62,6 +62,7 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
     model = urdf::parseURDF(plain.text);
     tree.limits = std::move(plain.limits);
     tree.lacks = std::move(plain.lacks);
+    tree.turns = std::move(plain.turns);
   } catch (const std::exception& error) {
     throw InvalidModel(one_line(name + ": " + error.what()));
   }

@@ -15,11 +15,11 @@ namespace dashpot::controller {
 [[noreturn]] void refuse(const std::string& name, const std::string& kind,
                          const std::string& element, const std::string& reason);
 
-/// A URDF as urdfdom has it, with the limits that urdfdom does not know, and what limits lack.
+/// A URDF as urdfdom has it, and what text::PlainUrdf tells of it.
 struct UrdfTree {
   std::shared_ptr<urdf::ModelInterface> model;
   std::map<std::string, text::MotionLimits, std::less<>> limits;  ///< by joint
-  std::map<std::string, std::string, std::less<>> lacks;          ///< likewise
+  std::map<std::string, std::string, std::less<>> lacks, turns;   ///< likewise
 };
 
 /// Parses what text::plain_urdf makes of a URDF, and checks that it is a tree: one root, one parent

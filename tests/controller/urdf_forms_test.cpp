@@ -219,6 +219,10 @@ TEST(UrdfForms, AreDoubtedWhereUnitsCannotBeRight) {
               ::testing::Contains(HasSubstr("is many turns: is it in deg?")));
   EXPECT_THAT(warnings("velocity=\"2.175\" effort=\"87\"", "velocity=\"20.8\" effort=\"87000\""),
               ElementsAre(HasSubstr("is it in deg/s or rpm?"), HasSubstr("is it in N m?")));
+  EXPECT_THAT(
+      warnings("0.333\" rpy=\"0 0 0\"", "0.333\" rpy=\"0 -90 0\""),
+      ElementsAre(HasSubstr("joint1': its origin's rpy is 0 -90 0 rad, beyond a turn: is")));
+  EXPECT_THAT(warnings("0.333\" rpy=\"0 0 0\"", "0.333\" rpy=\"0 0 6.28319\""), IsEmpty());
 }
 
 TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
