@@ -212,7 +212,7 @@ const dashpot::stress::AddPart part(
      {{500, 12, "releases", "a release from about 0.02 rad, 1.5 s at 1 kHz"},
       {50, 4, "triples", "three of them"},
       {20, 2, "rubbing", "three of lightly damped arms whose joints rub"},
-      {20, 2, "stiffening", "three of lightly damped arms whose springs stiffen"},
+      {20, 6, "stiffening", "three of lightly damped arms whose springs stiffen"},
       {50, 2, "shaken", "two minutes of random torques, about 0.01 rad, at 500 Hz"},
       {20, 4, "chirps", "a chirp of torques, 0.3 to 12 Hz in 10 s at 1 kHz, about 0.02 rad"},
       {36, 1, "arms",
