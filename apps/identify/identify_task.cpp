@@ -139,7 +139,7 @@ class Task {
       const bool linear = posture.found.explained > kExplains &&
                           posture.found.modes.size() <= report_.channels.size();
       if (large && !(linear && fades) && command_.large_motion) {
-        report_.notes.push_back(
+        report_.notes.emplace_back(
             "joints move by more than 0.5 rad: frequencies and ratios may change with the size of "
             "the motion, which deviations do not count; smaller pushes tell");
       } else if (large && !(linear && fades)) {
