@@ -138,15 +138,16 @@ class Task {
           });
       const bool linear = posture.found.explained > kExplains &&
                           posture.found.modes.size() <= report_.channels.size();
-      if (large && !(linear && fades) && command_.large_motion) {
+      if (large && !(linear && fades)) {
+        if (!command_.large_motion) {
+          for (const std::size_t i : group)
+            report_.parts[parts_.list[i].report].reason = kLargeAdvice;
+          report_.advice = kLargeAdvice;
+          continue;
+        }
         report_.notes.emplace_back(
             "joints move by more than 0.5 rad: frequencies and ratios may change with the size of "
             "the motion, which deviations do not count; smaller pushes tell");
-      } else if (large && !(linear && fades)) {
-        for (const std::size_t i : group)
-          report_.parts[parts_.list[i].report].reason = kLargeAdvice;
-        report_.advice = kLargeAdvice;
-        continue;
       }
       for (const std::size_t i : group) {
         report_.parts[parts_.list[i].report].posture = static_cast<int>(report_.postures.size());

@@ -110,7 +110,9 @@ TEST(Identify, SaysFirstWhatARecordShows) {
     return now;
   };
   const std::string far = record("pendulum.csv", 1, pendulum);
-  EXPECT_THAT(no_modes({far})["advice"].dump(), HasSubstr("--large-motion takes it"));
+  const Json refused = no_modes({far});
+  EXPECT_EQ(refused["verdict"], "large motion");
+  EXPECT_THAT(refused["advice"].dump(), HasSubstr("--large-motion takes it"));
   const Json taken = no_modes({far, "--large-motion"});
   EXPECT_EQ(taken["verdict"], "decay");
   EXPECT_THAT(taken["notes"].dump(), HasSubstr("change with the size of the motion"));
