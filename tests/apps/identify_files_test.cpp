@@ -1,6 +1,5 @@
 // Which files `dashpot identify` reads, and how it refuses others.
 #include <dashpot/tests/apps/identify_run.hpp>
-#include <dashpot/tests/support/sanitized.hpp>
 
 #include <functional>
 #include <sstream>
@@ -70,7 +69,6 @@ std::string printed(const char* format, double value) {
 /// Whole seconds lose their point, small times get an exponent, large ones have many digits; no
 /// sample is lost in any of them.
 TEST(IdentifyFiles, TakesTimesAsTheyAreWritten) {
-  DASHPOT_SKIP_IF_QUICK();
   struct Stamps {
     const char* heading;
     std::function<std::string(int)> stamp;
@@ -112,7 +110,6 @@ TEST(IdentifyFiles, TakesTimesAsTheyAreWritten) {
 
 /// Each is what a recorder or a spreadsheet makes of it, and none of it changes the modes.
 TEST(IdentifyFiles, TakesWhatRecordersAddAndLeaveOut) {
-  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   const std::string good = decay_csv("time,q1,q2", 1), rows = good.substr(good.find('\n') + 1);
   const auto with = [&rows](const std::string& heading, const std::string& end = "") {
