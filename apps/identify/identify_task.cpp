@@ -23,6 +23,22 @@ constexpr double kSamePosture = 0.02;
 constexpr double kExplains = 0.999;
 constexpr double kFades = 0.5;  // and some mode has to lose so much, as an exponent
 
+constexpr const char* kNotLinear =
+    "most of what explains the motion is no mode, as where joints rub, reach a limit or touch "
+    "something: larger pushes, a measured excitation (--inputs), or check-model for the friction, "
+    "tell more";
+
+/// Whether fewer factors of the model are rejected as what is not linear than are believed.
+bool is_linear(const identification::Identification& found) {
+  const auto doubted = std::count_if(
+      found.rejected.begin(), found.rejected.end(), [](const identification::MeasuredMode& mode) {
+        return mode.reason.find("not linear") != std::string::npos ||
+               mode.reason.find("not believed") != std::string::npos ||
+               mode.reason.find("much is left over") != std::string::npos;
+      });
+  return static_cast<std::size_t>(doubted) <= found.modes.size();
+}
+
 /// Returns what was wrong, without the name of the call in front.
 std::string reason_of(const std::invalid_argument& error) {
   constexpr std::string_view kCall = "identify: ";
@@ -88,6 +104,7 @@ class Task {
       report_.kind = MotionKind::kNothing;
       if (parts_.large) report_.kind = MotionKind::kLargeMotion, report_.advice = kLargeAdvice;
     }
+    std::size_t silent = 0;  // postures without modes, because the motion is not linear
     identification::IdentifyOptions options;
     options.max_order = command_.order;
     const std::vector<std::vector<std::size_t>> groups = by_posture();
@@ -157,10 +174,14 @@ class Task {
         report_.notes.push_back(report_.channels[static_cast<std::size_t>(c)].name +
                                 " never moves, and says nothing");
       }
+      if (report_.kind == MotionKind::kDecays && !is_linear(posture.found)) {
+        silent += posture.found.modes.empty();
+        if (!posture.found.modes.empty()) report_.notes.emplace_back(kNotLinear);
+      }
       report_.postures.push_back(std::move(posture));
     }
     if (!report_.postures.empty()) {
-      report_.advice.clear();
+      report_.advice = silent == report_.postures.size() ? kNotLinear : "";
     } else if (report_.advice == kLargeAdvice) {
       report_.kind = MotionKind::kLargeMotion;
     } else if (report_.kind != MotionKind::kLimitCycle) {

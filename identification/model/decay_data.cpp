@@ -72,6 +72,7 @@ DecayData::DecayData(const std::vector<MotionRecord>& all,
     parts.push_back(std::move(part));
   }
   motion.setZero(channels);
+  rounding.setZero(channels);
   for (const DecayPart& part : parts) {
     for (std::size_t c = 0; c < part.channels.size(); ++c) {
       const auto y = part.output.col(static_cast<Index>(c));
@@ -82,7 +83,7 @@ DecayData::DecayData(const std::vector<MotionRecord>& all,
 }
 
 double DecayData::least_noise(Index channel) const {
-  return std::max(kLinear * motion[channel], 1e-300);
+  return std::max({kLinear * motion[channel], rounding[channel], 1e-300});
 }
 
 }  // namespace dashpot::identification

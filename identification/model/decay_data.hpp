@@ -68,6 +68,10 @@ struct DecayData {
   /// looked for in it.
   static constexpr double kLinear = 1e-4;
 
+  /// Standard deviation of what rounds each channel, where that is its noise; else 0. It is alike
+  /// from sample to sample, so that means of samples have as much.
+  Eigen::VectorXd rounding;
+
   double least_noise(Eigen::Index channel) const;
 
   bool drifts() const { return parts.front().drifts; }

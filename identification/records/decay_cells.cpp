@@ -111,9 +111,10 @@ MatrixXd on_grid(const MotionRecord& record, double step, MatrixXd* widths) {
   return grid;
 }
 
-VectorXd first_noise(const std::vector<MotionRecord>& records) {
+VectorXd first_noise(const std::vector<MotionRecord>& records, VectorXd* steps) {
   const Index channels = records.front().output.rows();
   VectorXd noise(channels);
+  if (steps != nullptr) steps->setZero(channels);
   for (Index c = 0; c < channels; ++c) {
     std::vector<double> differences;
     double largest = 0, quantum = std::numeric_limits<double>::infinity(),
@@ -138,6 +139,7 @@ VectorXd first_noise(const std::vector<MotionRecord>& records) {
     const double seen = hankel < size / 2 ? hankel : size;
     const double digit = std::isfinite(quantum) ? quantum / std::sqrt(12.0) : 0;
     noise[c] = std::max({seen, digit, 1e-13 * largest, 1e-300});
+    if (steps != nullptr && digit > seen) (*steps)[c] = digit;
   }
   return noise;
 }

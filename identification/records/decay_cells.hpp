@@ -5,7 +5,8 @@ namespace dashpot::identification {
 
 /// A first estimate of each channel's noise, from fifth differences of neighbouring samples, which
 /// leave little of a slow motion. Too large where samples are far apart.
-Eigen::VectorXd first_noise(const std::vector<MotionRecord>& records);
+Eigen::VectorXd first_noise(const std::vector<MotionRecord>& records,
+                            Eigen::VectorXd* steps = nullptr);
 
 /// s, the median.
 double typical_step(const std::vector<MotionRecord>& records);

@@ -186,7 +186,7 @@ Identification identify_ambient(const std::vector<MotionRecord>& records,
         (columns.middleCols(at, width) * amplitudes.middleRows(at, width)).squaredNorm() / motion;
     at += width;
   }
-  judge(std::move(modes), data.duration, data.step, result);
+  judge(std::move(modes), {data.duration, data.step}, result);
   for (auto* list : {&result.modes, &result.rejected}) {  // back in the channels' units
     for (MeasuredMode& mode : *list) mode.shape = turned(data.sizes.asDiagonal() * mode.shape);
   }

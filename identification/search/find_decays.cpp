@@ -25,7 +25,7 @@ constexpr double kStandstill = 1;  // within a motion
 constexpr double kEnvelope = 1.5;  // window
 // Times over which positions are compared, of which the first that shows a push counts: over short
 // ones fast motion shows, over long ones slow motion stands out of more noise.
-constexpr std::array kLags = {0.025, 0.1};
+constexpr std::array kLags = {0.025, 0.1, 0.4};
 constexpr Index kLeast = 20;  // samples of a decay
 
 /// How fast the channels move: root mean square of differences over `lag`, in units of their noise.
@@ -174,7 +174,7 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
   }
   starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
   // Large motions are not linear, but what decays fast is seen in them only.
-  constexpr double kEnough = 1e-3, kMore = 0.03, kSeen = 20;
+  constexpr double kEnough = 1e-3, kMore = 0.03, kSeen = 8;
   // Digits that do not change are no motion without noise.
   const VectorXd enough = (kEnough * motion_of(part_of(record, from, to))).cwiseMax(noise);
   // Mean logarithm of what a model leaves over from a start on; none where too little follows.

@@ -63,28 +63,32 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
   }
 }
 
+/// Relative deviations of what is not determined. Those of a single decay are widened by more.
+constexpr double kUndetermined = 0.05, kUndeterminedInDecays = 0.06;
 constexpr double kHarmonic = 3;  // of friction and other forces that are odd; sums tell even ones
+constexpr double kExplains = 5;  // energy, over a mode's: what is not linear is weaker than that
 constexpr double kMostEnergy = 100;     // energy of what cancels against others
 constexpr double kCoincides = 0.002;    // relative: what is not linear moves the larger modes, too
 constexpr double kLightlyDamped = 0.3;  // what lasts long enough to have harmonics
 
 /// Why a mode is not to be believed; empty if it is.
-std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all, double duration,
-                  double step) {
+std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all,
+                  const Judgement& records) {
   const auto& lambda = mode.eigenvalues;
+  const double vague = records.decays ? kUndeterminedInDecays : kUndetermined;
   if (lambda[0] == lambda[1] && lambda[0].imag() == 0) {
     return "a decay without oscillation, whose partner the records do not show";
   }
   if (mode.energy > kMostEnergy) return "it cancels against others like it: neither is determined";
-  if (!(mode.natural_frequency_std < 0.05 * mode.natural_frequency)) {
+  if (!(mode.natural_frequency_std < vague * mode.natural_frequency)) {
     return "its frequency is not determined";
   }
-  if (!(mode.damping_ratio_std < 0.05 * std::max(1.0, mode.damping_ratio))) {
+  if (!(mode.damping_ratio_std < vague * std::max(1.0, mode.damping_ratio))) {
     return "its damping ratio is not determined";
   }
-  if (mode.natural_frequency * step > 2.5) return "too fast for the samples";
-  if (lambda[0].imag() * duration < 3 && lambda[0].imag() != 0 &&
-      -lambda[0].real() * duration < 1) {
+  if (mode.natural_frequency * records.step > 2.5) return "too fast for the samples";
+  if (lambda[0].imag() * records.duration < 3 && lambda[0].imag() != 0 &&
+      -lambda[0].real() * records.duration < 1) {
     return "too slow for the record";
   }
   // Other orders miss heavily damped modes, but no lightly damped one that is there.
@@ -107,10 +111,12 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
     }
   }
   if (mode.damping_ratio + 2 * mode.damping_ratio_std < 0) return "it grows";
-  if (mode.damping_ratio <= 0) return "it does not decay within its deviation";
+  if (mode.damping_ratio <= (records.decays ? mode.damping_ratio_std : 0)) {
+    return "it does not decay within its deviation";
+  }
   // Of modes that are known themselves.
   const auto explains = [&mode](const MeasuredMode& other) {
-    return &other != &mode && other.energy > 10 * mode.energy && other.energy < kMostEnergy;
+    return &other != &mode && other.energy > kExplains * mode.energy && other.energy < kMostEnergy;
   };
   const auto coincides = [&mode](double distance, double size) {
     return distance < std::max(kCoincides * size, 2 * mode.natural_frequency_std);
@@ -169,7 +175,7 @@ double stability_of(const MeasuredMode& mode,
           std::any_of(mode.eigenvalues.begin(), mode.eigenvalues.end(), [&](const Complex& lambda) {
             const double size = std::abs(lambda);
             return std::abs(pole.eigenvalue - lambda) <
-                   std::max(0.05 * size, 3 * mode.natural_frequency_std);
+                   std::max(0.05 * size, 2 * mode.natural_frequency_std);
           });
       if (!near || likeness(pole.shape, mode.shape) < 0.9) continue;
       ++having;
@@ -179,19 +185,24 @@ double stability_of(const MeasuredMode& mode,
   return all > 0 ? static_cast<double>(having) / all : 0;
 }
 
-void judge(std::vector<MeasuredMode> modes, double duration, double step, Identification& result) {
+void judge(std::vector<MeasuredMode> modes, const Judgement& records, Identification& result) {
   pair_reals(modes);
   for (const MeasuredMode& mode : modes) {
     MeasuredMode judged = mode;
-    if (judged.reason.empty()) judged.reason = doubt(mode, modes, duration, step);
+    if (judged.reason.empty()) judged.reason = doubt(mode, modes, records);
     (judged.reason.empty() ? result.modes : result.rejected).push_back(std::move(judged));
   }
-  // Where the rest is coloured, as by friction, and most of a model is rejected, the remaining
-  // modes only make up for it as well.
+  // A model of a decay that is not linear explains it to its noise, with modes that no model of
+  // another order has; that of a linear one has few of those, or nothing in it is rejected. What
+  // moves driven and ambient motion is left over, and its colour tells.
+  const auto alone = std::stable_partition(result.modes.begin(), result.modes.end(),
+                                           [](const auto& mode) { return mode.stability > 0; });
+  const auto stable = static_cast<std::size_t>(alone - result.modes.begin());
   constexpr double kWhite = 1.5;
-  if (result.whiteness > kWhite && result.rejected.size() > result.modes.size()) {
-    const auto alone = std::stable_partition(result.modes.begin(), result.modes.end(),
-                                             [](const auto& mode) { return mode.stability > 0; });
+  const bool doubted =
+      records.decays ? !result.rejected.empty() && 2 * stable <= result.modes.size()
+                     : result.whiteness > kWhite && result.rejected.size() > result.modes.size();
+  if (doubted) {
     for (auto mode = alone; mode != result.modes.end(); ++mode) {
       mode->reason = "in no model of another order, and most of this one is not believed";
       result.rejected.push_back(std::move(*mode));

@@ -23,9 +23,14 @@ std::vector<ModelPole> model_poles(const std::vector<std::vector<RealizedPole>>&
 double stability_of(const MeasuredMode& mode,
                     const std::vector<std::vector<RealizedPole>>& by_order, int order);
 
+/// What modes are judged by besides themselves.
+struct Judgement {
+  double duration = 0, step = 0;  ///< s, of the records
+  bool decays = false;            ///< free ones, in which a mode fades
+};
+
 /// Makes overdamped modes of single eigenvalues of like shapes, and sorts out what is not to be
-/// believed, with reasons; those with a reason have one already. `duration` and `step` are those of
-/// the records, s.
-void judge(std::vector<MeasuredMode> modes, double duration, double step, Identification& result);
+/// believed, with reasons; those with a reason have one already.
+void judge(std::vector<MeasuredMode> modes, const Judgement& records, Identification& result);
 
 }  // namespace dashpot::identification

@@ -36,7 +36,7 @@ struct Row {
   const char* what;
   double recordings;
   Recipe recipe;
-  bool finds = false;  ///< at least kLeastFound of the strong modes have to be found
+  bool finds = false;  ///< as many have to be found as kLeastFound of the strong, determined ones
 };
 
 const std::vector<Row>& rows() {
@@ -158,7 +158,7 @@ std::vector<Found> believed(const Json& report) {
 }
 
 struct Tally {
-  int recordings = 0, believed = 0, wrong = 0, strong = 0, found = 0;
+  int recordings = 0, believed = 0, wrong = 0, strong = 0, determined = 0, found = 0;
   int frequency_inside = 0, ratio_inside = 0;
   double time = 0, longest = 0;
   int era_believed = 0, era_wrong = 0, era_found = 0;
@@ -200,6 +200,7 @@ void compare(const std::vector<TrueMode>& modes, const std::vector<Found>& all, 
   }
   for (std::size_t i = 0; i < modes.size(); ++i) {
     tally.strong += modes[i].strong;
+    tally.determined += modes[i].strong && modes[i].determined;
     tally.found += modes[i].strong && seen[i];
   }
 }
@@ -287,7 +288,7 @@ std::string missed(const Row& row, const Tally& tally) {
   std::string text;
   const int right = tally.believed - tally.wrong;
   if (tally.wrong > kMostFalse * tally.believed) text += " false";
-  if (row.finds && tally.found < kLeastFound * tally.strong) text += " found";
+  if (row.finds && tally.found < kLeastFound * tally.determined) text += " found";
   if (std::min(tally.frequency_inside, tally.ratio_inside) < kLeastInside * right)
     text += " inside";
   return text;
@@ -317,7 +318,8 @@ bool identify_arms(const Request& request) {
   }
   std::printf(
       "seed %lu\n"
-      "| record | recordings | believed | false | strong modes found | inside 95 %%: frequency, "
+      "| record | recordings | believed | false | strong modes found, and determined | inside 95 "
+      "%%: frequency, "
       "ratio | time: mean, longest | ERA: believed, false, found, time | misses |\n"
       "|---|---|---|---|---|---|---|---|---|\n",
       request.seed);
@@ -329,10 +331,10 @@ bool identify_arms(const Request& request) {
     const std::string lacks = missed(row, tally);
     good = good && (i > 0 || 2 * tally.found >= tally.strong);
     const double count = tally.recordings;
-    std::printf("| %s | %d | %d | %d | %d of %d | %d, %d of %d | %.2f s, %.1f s | ", row.what,
+    std::printf("| %s | %d | %d | %d | %d of %d, %d | %d, %d of %d | %.2f s, %.1f s | ", row.what,
                 tally.recordings, tally.believed, tally.wrong, tally.found, tally.strong,
-                tally.frequency_inside, tally.ratio_inside, tally.believed - tally.wrong,
-                tally.time / count, tally.longest);
+                tally.determined, tally.frequency_inside, tally.ratio_inside,
+                tally.believed - tally.wrong, tally.time / count, tally.longest);
     if (tally.era_believed > 0) {
       std::printf("%d, %d, %d, %.2f s", tally.era_believed, tally.era_wrong, tally.era_found,
                   tally.era_time / count);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -50,8 +51,11 @@ RecordedArm::RecordedArm(const Recipe& recipe, std::size_t which, Dice& draw)
   for (double& q : posture) q = draw.uniform(-1.5, 1.5);
   home_ = spread(posture, coordinates_ / joints_);
   ideal_ = make_plant(0, std::nullopt);
-  choose_springs(draw);
-  linearize();
+  double growth = 0;
+  do {  // gears bend under what is too stiff, or damped too much, for the loop
+    choose_springs(draw);
+    growth = linearize();
+  } while (growth >= 1);
 }
 
 std::unique_ptr<testing::MujocoArm> RecordedArm::make_plant(
@@ -111,7 +115,7 @@ VectorXd RecordedArm::tick(Plant& arm, const VectorXd& state, const VectorXd& pu
   return next;
 }
 
-void RecordedArm::linearize() {
+double RecordedArm::linearize() {
   constexpr double kStep = 1e-5, kLeast = 1e-3, kReal = 1e-6;
   const Index size = 2 * coordinates_ + recipe_.delay * joints_;
   const VectorXd none = VectorXd::Zero(joints_), rest = VectorXd::Zero(size);
@@ -129,10 +133,12 @@ void RecordedArm::linearize() {
   const Eigen::EigenSolver<MatrixXd> solver(A_);
   values_ = solver.eigenvalues().array().log() / kTick;
   vectors_ = solver.eigenvectors();
+  modes_.clear();
   for (Index i = 0; i < size; ++i) {  // what is over at once is the delay
     if (std::abs(solver.eigenvalues()[i]) < kLeast || values_[i].imag() < -kReal) continue;
     modes_.push_back({values_[i]});
   }
+  return solver.eigenvalues().cwiseAbs().maxCoeff();
 }
 
 MatrixXd RecordedArm::pushes(Dice& draw, Recording& recording) const {
@@ -206,6 +212,53 @@ void RecordedArm::mark_strong(const MatrixXd& states, const Recording& recording
   }
 }
 
+/// The inverse of Fisher's information of a release, with all amplitudes and rests unknown.
+void RecordedArm::mark_determined(const MatrixXd& motion) {
+  const auto every = static_cast<Index>(std::lround(1 / (kTick * recipe_.rate)));
+  const MatrixXd y = motion(Eigen::all, Eigen::seq(0, Eigen::last, every)).transpose();
+  const VectorXd t = kTick * static_cast<double>(every) *
+                     VectorXd::LinSpaced(y.rows(), 0, static_cast<double>(y.rows() - 1));
+  const auto width = static_cast<Index>(2 * modes_.size());
+  MatrixXd waves(y.rows(), width + 1);
+  waves.col(width).setOnes();
+  for (Index k = 0; k < width; k += 2) {
+    const Eigen::VectorXcd wave = (modes_[static_cast<std::size_t>(k / 2)].value * t).array().exp();
+    waves.col(k) = wave.real();
+    waves.col(k + 1) = wave.imag();
+  }
+  const VectorXd scale = waves.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(waves * scale.asDiagonal());
+  const MatrixXd amplitudes = scale.asDiagonal() * qr.solve(y);
+  const MatrixXd basis = qr.householderQ() * MatrixXd::Identity(y.rows(), qr.rank());
+  MatrixXd slopes(y.size(), width);  // by the logarithm of each frequency, and by each ratio
+  for (Index k = 0; k < width; k += 2) {
+    const std::complex<double> value = modes_[static_cast<std::size_t>(k / 2)].value;
+    const double w = std::abs(value), ratio = -value.real() / w;
+    const VectorXd c = waves.col(k).cwiseProduct(t), s = waves.col(k + 1).cwiseProduct(t);
+    const MatrixXd by_real = c * amplitudes.row(k) + s * amplitudes.row(k + 1);
+    const MatrixXd by_imaginary = c * amplitudes.row(k + 1) - s * amplitudes.row(k);
+    const double turn = w * ratio / std::sqrt(std::max(1e-12, 1 - ratio * ratio));
+    for (const auto& [column, slope] :
+         {std::pair<Index, MatrixXd>(k, value.real() * by_real + value.imag() * by_imaginary),
+          {k + 1, -w * by_real - turn * by_imaginary}}) {
+      slopes.col(column) = (slope - basis * (basis.transpose() * slope)).reshaped();
+    }
+  }
+  const VectorXd size = slopes.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  const MatrixXd correlation =
+      size.asDiagonal() * (slopes.transpose() * slopes) * size.asDiagonal();
+  const VectorXd variance =
+      correlation.completeOrthogonalDecomposition().pseudoInverse().diagonal().cwiseProduct(
+          size.cwiseAbs2());
+  const double step = recipe_.bits > 0 ? 2 * std::numbers::pi / std::exp2(recipe_.bits) : 0;
+  const double noise = std::hypot(recipe_.noise, step / std::sqrt(12.0));
+  constexpr double kKnown = 0.05;
+  for (Index k = 0; k < width; k += 2) {
+    modes_[static_cast<std::size_t>(k / 2)].determined =
+        noise * std::sqrt(variance.segment(k, 2).maxCoeff()) < kKnown;
+  }
+}
+
 sim::Wall RecordedArm::wall_in_the_way(const MatrixXd& states, Dice& draw) {
   const auto tip = [&](const VectorXd& state) {
     ideal_->place(home_ + state.head(coordinates_), sim::JointVector::Zero(coordinates_));
@@ -276,6 +329,7 @@ Recording RecordedArm::record(Dice& draw) {
     states *= factor;
   }
   mark_strong(states, recording);
+  if (recipe_.motion == Motion::kRelease) mark_determined(motors(states));
   std::optional<sim::Wall> wall;
   if (recipe_.wall) wall = wall_in_the_way(states, draw);
   const auto arm = make_plant(draw.uniform(recipe_.least_friction, recipe_.most_friction), wall);
