@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace dashpot::controller {
 
@@ -27,12 +28,14 @@ class InvalidSettings : public std::invalid_argument {
 /// in seconds; what it says names the likely unit.
 void validate(const Settings& settings, const RobotModel& model);
 
-/// One line that asks about the stiffness and the damping of the task (6 x 6), or an empty one:
-/// whether the rotations stand first, where a tip on a lever of twice the arm's reach would turn
-/// harder than it moves, and whether the damping is a ratio, where one number up to 2 stands for
-/// all directions and leaves a mass of 1 kg a ratio below 0.1.
-std::string doubtful_gains(const RobotModel& model, const Matrix6& stiffness,
-                           const Matrix6& damping);
+/// Lines that ask about gains: whether the rotations of the task's stiffness or damping stand first,
+/// where a tip on a lever of twice the arm's reach would turn harder than it moves, and whether a
+/// damping is ratios, where no number is above 2 and the largest, at the tip against translation,
+/// leaves a mass or an inertia of 1 a ratio below 0.1. Joints with less than 100 N m/rad are not
+/// asked about.
+std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains);
+/// The same of an arm of which only the reach is known, m.
+std::vector<std::string> doubtful_gains(double reach, const Gains& gains);
 
 /// How the brake stops an arm that is as its model: each joint alone from 0.9 of its velocity
 /// limit, with the mass matrix and weight of one posture, rigid gears, and no friction.

@@ -189,9 +189,7 @@ AuditTask read_task(const AuditCommand& command) {
   task.drives = arm.drives;
   AuditOptions& audit = task.options;
   read_gains(command, task.model, audit, task.intended_ratio);
-  if (!audit.inertia_blocks) {
-    warn_of(task.model, audit.gains.task_stiffness, audit.gains.task_damping);
-  }
+  if (!audit.inertia_blocks) warn_of(task.model, audit.gains);
   if (const auto negative = analysis::negative_eigenvalues(audit.gains.task_damping);
       negative.size() > 0) {
     print_error("warning: the task's damping has the eigenvalue " + format_number(negative[0], 4) +

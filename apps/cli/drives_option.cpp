@@ -40,17 +40,16 @@ void warn_of(const controller::RobotModel& model) {
   }
 }
 
-void warn_of(const controller::RobotModel& model, const controller::Matrix6& stiffness,
-             const controller::Matrix6& damping) {
-  const std::string doubt = controller::doubtful_gains(model, stiffness, damping);
-  if (!doubt.empty()) print_error("warning: " + doubt);
+void warn_of(const controller::RobotModel& model, const controller::Gains& gains) {
+  for (const std::string& doubt : controller::doubtful_gains(model, gains)) {
+    print_error("warning: " + doubt);
+  }
 }
 
 void warn_of(const controller::Config& config) {
-  const controller::Gains& gains = config.settings.initial.gains;
   warn_of(config.model);
-  warn_of(config.model, gains.task_stiffness,
-          gains.task_damping_ratio > 0 ? controller::Matrix6::Zero() : gains.task_damping);
+  for (const std::string& note : config.notes) print_error("note: " + note);
+  warn_of(config.model, config.settings.initial.gains);
 }
 
 void add_gear_options(CLI::App& command, GearOptions& options) {

@@ -23,9 +23,8 @@ void take_accepted(const std::string& accepted, controller::ModelOptions& model)
 
 /// Tells people at the terminal what is doubtful about the description of the arm.
 void warn_of(const controller::RobotModel& model);
-/// Tells people at the terminal what is doubtful about stiffness and damping of the task.
-void warn_of(const controller::RobotModel& model, const controller::Matrix6& stiffness,
-             const controller::Matrix6& damping);
+/// Tells people at the terminal what is doubtful about gains.
+void warn_of(const controller::RobotModel& model, const controller::Gains& gains);
 /// Tells people at the terminal what is doubtful about the arm and gains of a configuration.
 void warn_of(const controller::Config& config);
 

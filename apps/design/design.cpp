@@ -291,7 +291,9 @@ void run_design(const DesignOptions& options, OutputFile& csv) try {
       }
     }
     if (const auto& stiffness = file.entries.front().impedance.task_stiffness) {
-      warn_of(*model, *stiffness, controller::Matrix6::Zero());
+      controller::Gains gains;
+      gains.task_stiffness = *stiffness;
+      warn_of(*model, gains);
     }
   }
   if (options.region) {

@@ -122,8 +122,11 @@ std::string to_json(const InspectOptions& options, const RobotModel& model,
                                    {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
                                    {"tip_position", json_list(dynamics.p_BT_B)},
                                    {"tip_rotation", json_rows(dynamics.R_BT)}};
-  const Stopping stops = controller::stopping(model, controller::default_settings(model), q);
-  result["stop"] = {{"time", json_list(stops.time)}, {"way", json_list(stops.way)}};
+  const controller::Settings settings = controller::default_settings(model);
+  if (!settings.limits.torque.isZero(0)) {
+    const Stopping stops = controller::stopping(model, settings, q);
+    result["stop"] = {{"time", json_list(stops.time)}, {"way", json_list(stops.way)}};
+  }
   for (const std::string& warning : model.warnings()) result["warnings"].push_back(warning);
   if (!options.drives.empty()) result["drives"] = drives_json(options.drives);
   return result.dump(2, ' ', true) + "\n";
@@ -229,7 +232,9 @@ std::string rotors_text(const InspectOptions& options, const RobotModel& model) 
 }
 
 std::string stop_table(const RobotModel& model, const JointVector& q) {
-  const Stopping stops = controller::stopping(model, controller::default_settings(model), q);
+  const controller::Settings settings = controller::default_settings(model);
+  if (settings.limits.torque.isZero(0)) return "";  // nobody knows
+  const Stopping stops = controller::stopping(model, settings, q);
   Eigen::MatrixXd rows(2, model.dof());
   rows << stops.time.transpose(), stops.way.transpose();
   return "\nStop of a joint alone from 0.9 of its velocity limit, with the default settings\n" +

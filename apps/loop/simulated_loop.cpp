@@ -1,6 +1,7 @@
 #include <dashpot/apps/loop/simulated_loop.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/controller/attachment.hpp>
+#include <dashpot/controller/tick_status.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -85,7 +86,9 @@ void ClosedLoop::guide(const JointVector& from, const JointVector& to, double du
     const std::int32_t status = controller_.update(time, q, qd, goal_.told(time), torque_);
     goal_.note_status(status);
     if (status >= DASHPOT_SETPOINT_REJECTED && !scene_.outside_limits) {
-      throw InputError("scenario.start", "the controller reports status " + std::to_string(status));
+      throw InputError("scenario.start",
+                       std::string("the controller does not take it: ") +
+                           controller::to_text(static_cast<controller::Status>(status)));
     }
   }
 }

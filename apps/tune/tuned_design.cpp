@@ -178,7 +178,9 @@ TunedArm::TunedArm(controller::RobotDescription robot, const controller::Setting
     : robot_(with_text(std::move(robot))),
       model_(robot_.model()),
       settings_(settings != nullptr ? *settings : controller::default_settings(model_)),
-      own_settings_(settings != nullptr) {}
+      own_settings_(settings != nullptr) {
+  if (!own_settings_ && settings_.limits.torque.isZero(0)) settings_.limits.torque.setConstant(100);
+}
 
 TunedArm TunedArm::with(const TuneJson& parts) const {
   static constexpr std::array<std::string_view, 6> kKeys = {"payload",          "reflected_inertia",

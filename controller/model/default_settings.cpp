@@ -17,6 +17,7 @@ double finite_or(double value, double otherwise) {
 }
 
 constexpr double kRatio = 0.7;
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// The damping of modes at the tip lets their velocities decay no faster than this, 1/s: far from
 /// where torque that is held for a period of 1 ms and arrives one late makes the loop unstable.
@@ -32,7 +33,7 @@ Settings default_settings(const RobotModel& model) {
   Limits& limits = settings.limits;
   limits.torque = limits.torque_rate = limits.velocity = none;
   limits.position_lower = limits.position_upper = none;
-  limits.external_torque = JointVector::Constant(n, std::numeric_limits<double>::infinity());
+  limits.external_torque = JointVector::Constant(n, kUnlimited);
   JointVector middle = none;
   for (int i = 0; i < n; ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
@@ -47,6 +48,10 @@ Settings default_settings(const RobotModel& model) {
     middle[i] = std::isfinite(center) ? center : 0;
   }
   settings.integral.torque = limits.torque / 10;
+  constexpr int kArm = 4;  // joints that make an arm: of a rig of fewer 100 N m will do
+  if (n >= kArm && model.joint_values(&Joint::effort).minCoeff() == kUnlimited) {
+    limits.torque.setZero();  // `validate` refuses it: nobody has said what the joints give
+  }
   settings.motion.velocity = 0.25 * limits.velocity;
   settings.motion.acceleration = limits.velocity;
   for (int i = 0; i < n; ++i) {  // it brakes at half of this, and changes it within the smoothing

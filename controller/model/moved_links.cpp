@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <tuple>
 
 namespace dashpot::controller {
 namespace {
@@ -151,6 +152,7 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
   constexpr double kEffort = 1e4;   // N m
   constexpr int kArm = 4;           // joints that make an arm
   constexpr double kNoLimit = 1e6;  // written where there is none
+  constexpr double kFriction = 2;   // times the effort limit, at the velocity limit
   constexpr double kRotors = 0.1;   // of the arm's mass at its reach, in kg m^2
   constexpr double kBare = 2e-4;    // kg m^2: all rotors are those of motors without their gears
   constexpr double kHeavy = 5;      // kg: in an arm that weighs so much
@@ -165,7 +167,9 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
   const double least = model.joint_values(&Joint::effort).minCoeff();
   if (model.dof() >= kArm && least == std::numeric_limits<double>::infinity()) {
     warnings.emplace_back(
-        "joints: none has a limit of effort (0 is none): limits.torque is 100 N m");
+        "joints: none has a limit of effort (0 is none): whether they hold the arm is not known, "
+        "and "
+        "a controller needs limits.torque");
   }
   const bool bare =
       mass > kHeavy && model.joint_values(&Joint::reflected_inertia).maxCoeff() < kBare;
@@ -178,6 +182,14 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
                        figure(mass) + " kg, " + figure(reach) + " m long: is it " +
                        (large ? "in kg m^2?"
                               : "that of the motor, to be multiplied by the gear ratio's square?"));
+    }
+    for (const auto& [kind, told, friction] :
+         {std::tuple("viscous", joint.viscous_friction, joint.viscous_friction * joint.velocity),
+          {"Coulomb", joint.coulomb_friction, joint.coulomb_friction}}) {
+      if (!std::isfinite(friction) || friction <= kFriction * joint.effort) continue;
+      doubt(joint, std::string(kind) + " friction, " + figure(told) + ", takes " +
+                       figure(friction) + " N m, its effort limit is " + figure(joint.effort) +
+                       " N m: is it in N m and N m s/rad?");
     }
     limit(joint, std::max(-joint.lower, joint.upper), kTurn,
           "position, " + figure(joint.lower) + " to " + figure(joint.upper) +

@@ -215,32 +215,58 @@ void check_initial(const Setpoint& initial, int n) {
   if (!initial.wrench.allFinite()) throw InvalidSettings("initial.wrench", "is not finite");
 }
 
+/// Asks whether a damping without a number above 2 is a ratio.
+std::string little_damping(const std::string& of, const std::string& unit,
+                           const Eigen::VectorXd& stiffness, const Eigen::VectorXd& damping) {
+  constexpr double kMostRatio = 2, kLeast = 0.1;
+  const double d = damping.head(stiffness.size()).maxCoeff(), k = stiffness.maxCoeff();
+  const bool ratios = damping.minCoeff() > 0 && damping.maxCoeff() <= kMostRatio;
+  if (!ratios || d >= kLeast * 2 * std::sqrt(k)) return "";
+  return of + " damping: " + number(d) + " is little beside a stiffness of " + number(k) + " " +
+         unit + ": is it a damping ratio?";
+}
+
 }  // namespace
 
-std::string doubtful_gains(const RobotModel& model, const Matrix6& stiffness,
-                           const Matrix6& damping) {
-  const double lever = 2 * reach_of(kdl_chain(model), model.joints());
-  for (const auto& [name, of, gains] :
-       {std::tuple("stiffness", "N", &stiffness), {"damping", "N s", &damping}}) {
-    const double move = gains->diagonal().head<3>().maxCoeff();
-    const double turn = gains->diagonal().tail<3>().maxCoeff();
-    if (!(move > 0) || turn <= lever * lever * move) continue;
-    return std::string("task ") + name + ": " + number(turn) + " " + of +
-           " m/rad against rotation is much beside " + number(move) + " " + of +
-           "/m against translation, which stands first: is the order another?";
+std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains) {
+  return doubtful_gains(reach_of(kdl_chain(model), model.joints()), gains);
+}
+
+std::vector<std::string> doubtful_gains(double reach, const Gains& gains) {
+  constexpr double kFirm = 100;  // N m/rad: joints of less may move little enough
+  constexpr double kSoft = 5;    // N/m
+  const Vector6 K = gains.task_stiffness.diagonal(), D = gains.task_damping.diagonal();
+  const bool damped = gains.task_damping_ratio == 0;
+  std::vector<std::string> said;
+  for (const auto& [name, of, entries] :
+       {std::tuple("stiffness", "N", &K), {"damping", "N s", &D}}) {
+    const double move = entries->head<3>().maxCoeff(), turn = entries->tail<3>().maxCoeff();
+    if (!(move > 0) || turn <= 4 * reach * reach * move || (entries == &D && !damped)) continue;
+    said.push_back(std::string("task ") + name + ": " + number(turn) + " " + of +
+                   " m/rad against rotation is much beside " + number(move) + " " + of +
+                   "/m against translation, which stands first: is the order another?");
   }
-  constexpr double kMostRatio = 2, kLeast = 0.1;
-  const double one = damping(0, 0), k = stiffness.diagonal().head<3>().maxCoeff();
-  if (!(one > 0) || one > kMostRatio || damping != one * Matrix6::Identity() ||
-      one >= kLeast * 2 * std::sqrt(k)) {
-    return "";
+  if (const double k = K.head<3>().maxCoeff(); k > 0 && k < kSoft) {
+    said.push_back("task stiffness: " + number(k) + " N/m hardly holds a tip: is it in N/mm?");
   }
-  return "task damping: " + number(one) + " in all directions is little beside a stiffness of " +
-         number(k) + " N/m: is it a damping ratio?";
+  if (damped && gains.task_damping.isDiagonal(0)) {
+    said.push_back(little_damping("task", "N/m", K.head(3), D));
+  }
+  const JointVector k = gains.joint_stiffness.diagonal();
+  if (k.size() > 0 && gains.joint_damping_ratio == 0 && k.maxCoeff() >= kFirm) {
+    said.push_back(little_damping("joint", "N m/rad", k, gains.joint_damping.diagonal()));
+  }
+  std::erase(said, "");
+  return said;
 }
 
 void validate(const Settings& settings, const RobotModel& model) {
   const int n = model.dof();
+  if (n > 0 && settings.limits.torque.size() == n && settings.limits.torque.isZero(0)) {
+    throw InvalidSettings("limits.torque",
+                          "missing: no joint of the model has a limit of effort (0 is none); "
+                          "write what each joint gives, N m");
+  }
   for_each_setting(settings, RangeCheck(n));
   if (!settings.limits.beyond_model) for_each_setting(settings, ScaleCheck(model));
   need_at_most("motion.smoothing", settings.motion.smoothing, kMostSmoothing, settings.period);
@@ -262,6 +288,10 @@ void validate(const Settings& settings, const RobotModel& model) {
          "limits.beyond_model: true accepts it");
   }
   const Watchdog& watchdog = settings.watchdog;
+  if (watchdog.setpoint_hold > 0 && watchdog.setpoint_hold < settings.period) {
+    fail("watchdog.setpoint_hold", watchdog.setpoint_hold, "s",
+         "shorter than a period, " + number(settings.period) + " s: every set-point is too old");
+  }
   if (watchdog.setpoint_damp > 0 && watchdog.setpoint_damp < watchdog.setpoint_hold) {
     fail("watchdog.setpoint_damp", watchdog.setpoint_damp, "s",
          "before setpoint_hold, " + number(watchdog.setpoint_hold) + " s, which would never come");

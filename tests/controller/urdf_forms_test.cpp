@@ -1,8 +1,10 @@
 // URDFs as people have them: newer versions, shapes, limits, inertias and units that are doubtful.
+#include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/sim/robot.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/dynamics_match.hpp>
@@ -11,6 +13,7 @@
 
 #include <functional>
 #include <limits>
+#include <regex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,12 +22,14 @@ namespace dashpot::controller {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
+using ::testing::ThrowsMessage;
 
 /// The Panda's description with one piece of text in place of another.
 std::string panda_with(const std::string& old, const std::string& next, bool all = false) {
@@ -133,6 +138,18 @@ TEST(UrdfForms, StateNoLimitByZero) {
       read_panda(panda_with("velocity=\"2.175\" effort=\"87\"", "velocity=\"0\" effort=\"0\""));
   EXPECT_EQ(model.joints()[0].velocity, std::numeric_limits<double>::infinity());
   EXPECT_EQ(model.joints()[0].effort, std::numeric_limits<double>::infinity());
+}
+
+/// Where no joint has a limit of effort, nobody commands torques before limits.torque is told.
+TEST(UrdfForms, WantTorquesWhereNoneIsStated) {
+  const RobotModel model = read_panda(std::regex_replace(
+      read_text(testing::arm_path("panda")), std::regex("effort=\"[0-9.]*\""), "effort=\"0\""));
+  EXPECT_THAT(model.warnings(), Contains(HasSubstr("a controller needs limits.torque")));
+  Settings settings = default_settings(model);
+  EXPECT_THAT([&] { (void)Controller(model, settings); },
+              ThrowsMessage<InvalidSettings>(HasSubstr("limits.torque: missing: no joint of the")));
+  settings.limits.torque.setConstant(7, 80);
+  EXPECT_NO_THROW((void)Controller(model, settings));
 }
 
 TEST(UrdfForms, MayHoldInertiasThatCannotMatter) {
