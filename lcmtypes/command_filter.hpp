@@ -72,7 +72,7 @@ class CommandFilter {
   CommandTaker take_;
   Command command_;
   CommandTally tally_;
-  std::string reason_;  ///< from `take_`, for the command that is being judged
+  std::string reason_;  ///< why the command that is being judged is refused, where more is known
   std::string last_reason_;
   std::array<Last, 8> last_{};
   std::int64_t heard_at_ = 0;    ///< when a command of the commander was last accepted; steady, us

@@ -1,17 +1,24 @@
 // `dashpot command`: one command to a loop that runs, and what the loop answers.
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/controller/settings_check.hpp>
+#include <dashpot/lcmtypes/command_filter.hpp>
 #include <dashpot/lcmtypes/command_t.hpp>
 #include <dashpot/lcmtypes/command_verdict.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <lcm/lcm-cpp.hpp>
+#include <limits>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <random>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,7 +33,7 @@ struct CommandOptions {
   std::string stiffness, damping, joint_stiffness, joint_damping, null_stiffness, null_damping;
   std::optional<double> damping_ratio, joint_damping_ratio;
   std::string payload;
-  bool release = false;
+  bool release = false, anyway = false;
 };
 
 /// Fills an array or vector of the message's.
@@ -177,6 +184,60 @@ void check(const CommandOptions& options) {
   make_command(options, any);
 }
 
+/// rad, from one orientation to another, both w, x, y, z.
+double turn(const double (&from)[4], const Eigen::Quaterniond& to) {
+  const Eigen::Quaterniond begin(from[0], from[1], from[2], from[3]);
+  return begin.normalized().angularDistance(to.normalized());
+}
+
+/// A command as a loop with the usual limits judges it, which knows no positions of joints.
+lcmtypes::CommandFilter judged(const command_t& command) {
+  lcmtypes::CommandLimits usual;
+  usual.position_upper.setConstant(command.n, std::numeric_limits<double>::infinity());
+  usual.position_lower = -usual.position_upper;
+  lcmtypes::CommandFilter filter(usual);
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(command.getEncodedSize()));
+  command.encode(bytes.data(), 0, command.getEncodedSize());
+  filter.judge(bytes.data(), bytes.size(), command.utime, 1);
+  return filter;
+}
+
+/// Refuses what is likely to be meant otherwise, as far as the loop's state tells. Throws
+/// InputError.
+void doubt(const command_t& command, const state_t& state) {
+  constexpr const char* kAnyway = "; --anyway sends it";
+  const double reach = Eigen::Map<const Eigen::Vector3d>(state.tip_position).norm();
+  const controller::Gains gains = judged(command).command().setpoint.gains;
+  for (const std::string& said : controller::doubtful_gains(std::max(1.0, reach), gains)) {
+    throw InputError("", said + kAnyway);
+  }
+  if ((command.parts & command_t::TIP_POSE) == 0) return;
+  constexpr double kFar = 1, kShare = 0.25;  // rad; of the turn
+  const double(&q)[4] = command.tip_quaternion;
+  const double told = turn(state.reference_tip_quaternion, {q[0], q[1], q[2], q[3]});
+  const double other = turn(state.reference_tip_quaternion, {q[3], q[0], q[1], q[2]});
+  if (told < kFar || other > kShare * told) return;
+  std::ostringstream text;
+  text.precision(3);
+  text << "turns the tip by " << 180 / std::numbers::pi * told << " deg, as x,y,z,w by "
+       << 180 / std::numbers::pi * other << " deg: w comes first" << kAnyway;
+  throw InputError("--tip-quaternion", text.str());
+}
+
+/// Why the loop refused a command: its verdict, and what the usual limits say of the numbers.
+std::string refusal(const command_t& command, lcmtypes::CommandVerdict verdict) {
+  const lcmtypes::CommandFilter usual = judged(command);
+  if (usual.tally().last_refusal == verdict) return usual.last_reason();
+  std::string text = lcmtypes::to_text(verdict);
+  if (verdict == lcmtypes::CommandVerdict::kOutOfLimits) {
+    text += (command.parts & command_t::JOINT_POSITION) != 0
+                ? ": --joint-position is beyond limits.position_lower, _upper, or in deg without "
+                  "its unit"
+                : ": beyond limits that its configuration sets under commands";
+  }
+  return text + "; the summary of the loop says more";
+}
+
 void send(const CommandOptions& options) {
   check(options);
   const std::string url = options.url.empty() ? lcmtypes::default_url() : options.url;
@@ -212,6 +273,7 @@ void send(const CommandOptions& options) {
   command_t command = make_command(options, *state);
   std::random_device random;
   command.sender = 1 + static_cast<std::int64_t>(random());
+  if (!options.anyway) doubt(command, *state);
   const auto publish = [&] {
     ++command.sequence;
     command.utime = std::chrono::duration_cast<std::chrono::microseconds>(
@@ -231,8 +293,8 @@ void send(const CommandOptions& options) {
         "what it was told may still act");
   }
   if (!commands()) {
-    throw std::runtime_error(std::string("refused: ") +
-                             to_text(static_cast<lcmtypes::CommandVerdict>(state->last_refusal)));
+    throw std::runtime_error(
+        "refused: " + refusal(command, static_cast<lcmtypes::CommandVerdict>(state->last_refusal)));
   }
   // The next sender may be another call of this program. A message may be lost; the loop's silence
   // ends the command of this sender then.
@@ -281,6 +343,7 @@ void add_command(CLI::App& program) {
   add("--payload", &CommandOptions::payload,
       "What the arm carries: mass, and center in the tip's axes; kg, m", "m[,x,y,z]");
   command->add_flag("--release", options->release, "Release the latched fault");
+  command->add_flag("--anyway", options->anyway, "Send what looks like another unit or order");
   add("--lcm-url", &CommandOptions::url,
       "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine", "URL");
   command->add_option("--timeout", options->timeout, "For a state, and for the answer, s")

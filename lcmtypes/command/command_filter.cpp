@@ -78,7 +78,7 @@ CommandVerdict CommandFilter::judge_message(const command_t& message, std::int64
   const Verdict time = judge_time(message, utime, *last);
   if (time != Verdict::kAccepted) return time;
   Command next = command_;
-  const Verdict values = copy_values(message, limits_, next);
+  const Verdict values = copy_values(message, limits_, next, reason_);
   if (values != Verdict::kAccepted) return values;
   const bool releases = (message.parts & command_t::RELEASE) != 0;
   if (releases && (fault_tick_ == 0 || message.fault_tick != fault_tick_)) {

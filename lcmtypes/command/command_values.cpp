@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <numbers>
+#include <sstream>
 #include <tuple>
 #include <vector>
 
@@ -31,18 +33,31 @@ Verdict first_fault(std::initializer_list<Verdict> verdicts) {
   return Verdict::kAccepted;
 }
 
+/// Says which number is beyond its limits; `other` is a unit in which it would not be.
+Verdict beyond(std::string& why, const std::string& name, double value, double least, double most,
+               const char* other = "") {
+  std::ostringstream text;
+  text << name << " is " << value << ", the limits are " << least << " to " << most;
+  if (*other != 0) text << ": is it in " << other << "?";
+  if (why.empty()) why = text.str();
+  return Verdict::kOutOfLimits;
+}
+
 /// Every entry finite and within [least, most].
 template <class Derived>
-Verdict judge_entries(const Eigen::MatrixBase<Derived>& values, double least, double most) {
+Verdict judge_entries(std::string& why, const char* name, const Eigen::MatrixBase<Derived>& values,
+                      double least, double most) {
   if (!values.allFinite()) return Verdict::kNotFinite;
-  const bool inside = (values.array() >= least && values.array() <= most).all();
-  return inside ? Verdict::kAccepted : Verdict::kOutOfLimits;
+  for (const double value : values.reshaped()) {
+    if (value < least || value > most) return beyond(why, name, value, least, most);
+  }
+  return Verdict::kAccepted;
 }
 
 /// Also symmetric and positive semidefinite, both to rounding; made symmetric exactly.
 template <class Matrix>
-Verdict judge_gains(Matrix& gains, double most) {
-  const Verdict entries = judge_entries(gains, -most, most);
+Verdict judge_gains(std::string& why, const char* name, Matrix& gains, double most) {
+  const Verdict entries = judge_entries(why, name, gains, -most, most);
   if (entries != Verdict::kAccepted || gains.size() == 0) return entries;
   const double largest = gains.cwiseAbs().maxCoeff();
   const double skew = (gains - gains.transpose()).cwiseAbs().maxCoeff();
@@ -81,25 +96,32 @@ Verdict copy_mode(const command_t& message, Setpoint& setpoint) {
 }
 
 Verdict copy_joint_position(const command_t& message, const CommandLimits& limits,
-                            Setpoint& setpoint) {
+                            Setpoint& setpoint, std::string& reason) {
+  constexpr double kDegree = std::numbers::pi / 180;
   const JointVector position = to_vector(message.joint_position);
   if (!position.allFinite()) return Verdict::kNotFinite;
-  const bool inside = (position.array() >= limits.position_lower.array() &&
-                       position.array() <= limits.position_upper.array())
-                          .all();
-  if (!inside) return Verdict::kOutOfLimits;
+  for (Eigen::Index i = 0; i < position.size(); ++i) {
+    const double q = position[i], lower = limits.position_lower[i],
+                 upper = limits.position_upper[i];
+    if (q >= lower && q <= upper) continue;
+    const bool degrees = kDegree * q >= lower && kDegree * q <= upper;
+    const std::string name = "joint_position[" + std::to_string(i) + "]";
+    return beyond(reason, name, q, lower, upper, degrees ? "deg" : "");
+  }
   setpoint.joint_position = position;
   return Verdict::kAccepted;
 }
 
 /// A position no further than `most` from the origin, and a quaternion.
-Verdict copy_pose(const double (&given)[3], const double (&quaternion)[4], double most,
-                  controller::Pose& pose) {
+Verdict copy_pose(std::string& why, const char* name, const double (&given)[3],
+                  const double (&quaternion)[4], double most, controller::Pose& pose) {
   const Eigen::Map<const Eigen::Vector3d> position(given);
   const Eigen::Map<const Eigen::Vector4d> wxyz(quaternion);
   if (!position.allFinite() || !wxyz.allFinite()) return Verdict::kNotFinite;
   // Not stableNorm: an overflow to infinity is out of limits as well.
-  if (!(position.norm() <= most)) return Verdict::kOutOfLimits;
+  const double length = position.norm();
+  if (!(length <= most))
+    return beyond(why, name, length, 0, most, length <= 1000 * most ? "mm" : "");
   if (!(std::abs(wxyz.norm() - 1) <= kUnitTolerance)) return Verdict::kNotUnit;
   pose.position = position;
   pose.rotation =
@@ -107,20 +129,26 @@ Verdict copy_pose(const double (&given)[3], const double (&quaternion)[4], doubl
   return Verdict::kAccepted;
 }
 
-Verdict copy_wrench(const command_t& message, const CommandLimits& limits, Setpoint& setpoint) {
+Verdict copy_wrench(const command_t& message, const CommandLimits& limits, Setpoint& setpoint,
+                    std::string& why) {
   setpoint.wrench = Eigen::Map<const controller::Vector6>(message.wrench);
-  return first_fault({judge_entries(setpoint.wrench.head<3>(), -limits.force, limits.force),
-                      judge_entries(setpoint.wrench.tail<3>(), -limits.torque, limits.torque)});
+  return first_fault(
+      {judge_entries(why, "wrench's force", setpoint.wrench.head<3>(), -limits.force, limits.force),
+       judge_entries(why, "wrench's torque", setpoint.wrench.tail<3>(), -limits.torque,
+                     limits.torque)});
 }
 
-Verdict copy_joint_gains(const command_t& message, const CommandLimits& limits, Gains& gains) {
+Verdict copy_joint_gains(const command_t& message, const CommandLimits& limits, Gains& gains,
+                         std::string& why) {
   gains.joint_stiffness = to_matrix(message.joint_stiffness);
   gains.joint_damping = to_matrix(message.joint_damping);
-  return first_fault({judge_gains(gains.joint_stiffness, limits.joint_stiffness),
-                      judge_gains(gains.joint_damping, limits.joint_damping)});
+  return first_fault(
+      {judge_gains(why, "joint_stiffness", gains.joint_stiffness, limits.joint_stiffness),
+       judge_gains(why, "joint_damping", gains.joint_damping, limits.joint_damping)});
 }
 
-Verdict copy_task_gains(const command_t& message, const CommandLimits& limits, Gains& gains) {
+Verdict copy_task_gains(const command_t& message, const CommandLimits& limits, Gains& gains,
+                        std::string& why) {
   if (message.frame != command_t::BASE && message.frame != command_t::TOOL) {
     return Verdict::kUnknown;
   }
@@ -131,102 +159,101 @@ Verdict copy_task_gains(const command_t& message, const CommandLimits& limits, G
   }
   gains.task_stiffness = to_matrix(message.task_stiffness);
   gains.task_damping = to_matrix(message.task_damping);
-  return first_fault({judge_gains(gains.task_stiffness, limits.task_stiffness),
-                      judge_gains(gains.task_damping, limits.task_damping)});
+  return first_fault(
+      {judge_gains(why, "task_stiffness", gains.task_stiffness, limits.task_stiffness),
+       judge_gains(why, "task_damping", gains.task_damping, limits.task_damping)});
 }
 
 /// Gains without a ratio end it.
-Verdict copy_ratio(bool given, double value, double most, double& ratio) {
+Verdict copy_ratio(std::string& why, const char* name, bool given, double value, double most,
+                   double& ratio) {
   ratio = given ? value : 0;
   if (!given) return Verdict::kAccepted;
   if (!std::isfinite(value)) return Verdict::kNotFinite;
-  return value > 0 && value <= most ? Verdict::kAccepted : Verdict::kOutOfLimits;
+  if (value > 0 && value <= most) return Verdict::kAccepted;
+  return beyond(why, name, value, 0, most, value > most && value <= 100 * most ? "%" : "");
 }
 
 /// That a body can have this inertia is for the controller to judge.
 Verdict copy_payload(const command_t& message, const CommandLimits& limits,
-                     controller::Payload& payload) {
+                     controller::Payload& payload, std::string& why) {
   using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   payload = {message.payload_mass, Eigen::Map<const Eigen::Vector3d>(message.payload_center),
              Eigen::Map<const RowMajor3>(&message.payload_inertia[0][0])};
   const Eigen::Matrix<double, 1, 1> mass(payload.mass);
   // That of the whole mass at the greatest distance.
   const double most = payload.mass * limits.payload_distance * limits.payload_distance;
-  return first_fault(
-      {judge_entries(mass, 0, limits.payload),
-       judge_entries(payload.center, -limits.payload_distance, limits.payload_distance),
-       judge_entries(payload.inertia, -most, most)});
+  return first_fault({judge_entries(why, "payload_mass", mass, 0, limits.payload),
+                      judge_entries(why, "payload_center", payload.center, -limits.payload_distance,
+                                    limits.payload_distance),
+                      judge_entries(why, "payload_inertia", payload.inertia, -most, most)});
 }
 
 Verdict copy_tip_speed(const command_t& message, const CommandLimits& limits,
-                       controller::TipSpeed& speed) {
+                       controller::TipSpeed& speed, std::string& why) {
   speed = {};
-  for (const auto& [given, most, value] :
-       {std::tuple(message.linear_velocity, limits.linear_velocity, &speed.linear),
-        {message.angular_velocity, limits.angular_velocity, &speed.angular},
-        {message.tip_velocity, limits.tip_velocity, &speed.limit}}) {
+  for (const auto& [name, given, most, value] :
+       {std::tuple("linear_velocity", message.linear_velocity, limits.linear_velocity,
+                   &speed.linear),
+        {"angular_velocity", message.angular_velocity, limits.angular_velocity, &speed.angular},
+        {"tip_velocity", message.tip_velocity, limits.tip_velocity, &speed.limit}}) {
     if (!std::isfinite(given)) return Verdict::kNotFinite;
     const bool fits = given >= controller::TipSpeed::kLeast && given <= most;
-    if (given != 0 && !fits) return Verdict::kOutOfLimits;
+    if (given != 0 && !fits) return beyond(why, name, given, controller::TipSpeed::kLeast, most);
     if (given > 0) *value = given;
   }
   return Verdict::kAccepted;
 }
 
-Verdict copy_null_gains(const command_t& message, const CommandLimits& limits, Gains& gains) {
+Verdict copy_null_gains(const command_t& message, const CommandLimits& limits, Gains& gains,
+                        std::string& why) {
   gains.null_stiffness = to_vector(message.null_stiffness);
   gains.null_damping = to_vector(message.null_damping);
-  return first_fault({judge_entries(gains.null_stiffness, 0, limits.joint_stiffness),
-                      judge_entries(gains.null_damping, 0, limits.joint_damping)});
+  return first_fault(
+      {judge_entries(why, "null_stiffness", gains.null_stiffness, 0, limits.joint_stiffness),
+       judge_entries(why, "null_damping", gains.null_damping, 0, limits.joint_damping)});
 }
 
 }  // namespace
 
-CommandVerdict copy_values(const command_t& message, const CommandLimits& limits,
-                           Command& command) {
+CommandVerdict copy_values(const command_t& message, const CommandLimits& limits, Command& command,
+                           std::string& why) {
   if (message.n != limits.position_lower.size()) return Verdict::kWrongSize;
   if (message.parts <= 0 || (message.parts & ~kAllParts) != 0) return Verdict::kUnknown;
-  const auto judge = [&message](std::int32_t part, auto&& copy) {
-    return (message.parts & part) != 0 ? copy() : Verdict::kAccepted;
+  Verdict verdict = Verdict::kAccepted;
+  const auto judge = [&](std::int32_t part, auto&& copy) {
+    if (verdict == Verdict::kAccepted && (message.parts & part) != 0) verdict = copy();
+  };
+  const auto judge_ratio = [&](std::int32_t gains, std::int32_t part, const char* name,
+                               double value, double& ratio) {
+    judge(gains | part, [&] {
+      return copy_ratio(why, name, (message.parts & part) != 0, value, limits.damping_ratio, ratio);
+    });
   };
   Setpoint& setpoint = command.setpoint;
-  const Verdict verdict = first_fault({
-      judge(command_t::MODE, [&] { return copy_mode(message, setpoint); }),
-      judge(command_t::JOINT_POSITION,
-            [&] { return copy_joint_position(message, limits, setpoint); }),
-      judge(command_t::TIP_POSE,
-            [&] {
-              return copy_pose(message.tip_position, message.tip_quaternion, limits.reach,
-                               setpoint.tip_pose);
-            }),
-      judge(command_t::WRENCH, [&] { return copy_wrench(message, limits, setpoint); }),
-      judge(command_t::JOINT_GAINS,
-            [&] { return copy_joint_gains(message, limits, setpoint.gains); }),
-      judge(command_t::TASK_GAINS,
-            [&] { return copy_task_gains(message, limits, setpoint.gains); }),
-      judge(int{command_t::JOINT_GAINS} | int{command_t::JOINT_RATIO},
-            [&] {
-              return copy_ratio((message.parts & command_t::JOINT_RATIO) != 0,
-                                message.joint_damping_ratio, limits.damping_ratio,
-                                setpoint.gains.joint_damping_ratio);
-            }),
-      judge(int{command_t::TASK_GAINS} | int{command_t::TASK_RATIO},
-            [&] {
-              return copy_ratio((message.parts & command_t::TASK_RATIO) != 0,
-                                message.task_damping_ratio, limits.damping_ratio,
-                                setpoint.gains.task_damping_ratio);
-            }),
-      judge(command_t::PAYLOAD, [&] { return copy_payload(message, limits, command.payload); }),
-      judge(command_t::TOOL_FRAME,
-            [&] {
-              return copy_pose(message.tool_position, message.tool_quaternion, limits.tool_distance,
-                               command.tool);
-            }),
-      judge(command_t::TIP_SPEED,
-            [&] { return copy_tip_speed(message, limits, command.tip_speed); }),
-      judge(command_t::NULL_GAINS,
-            [&] { return copy_null_gains(message, limits, setpoint.gains); }),
+  Gains& gains = setpoint.gains;
+  judge(command_t::MODE, [&] { return copy_mode(message, setpoint); });
+  judge(command_t::JOINT_POSITION,
+        [&] { return copy_joint_position(message, limits, setpoint, why); });
+  judge(command_t::TIP_POSE, [&] {
+    return copy_pose(why, "tip_position's distance", message.tip_position, message.tip_quaternion,
+                     limits.reach, setpoint.tip_pose);
   });
+  judge(command_t::WRENCH, [&] { return copy_wrench(message, limits, setpoint, why); });
+  judge(command_t::JOINT_GAINS, [&] { return copy_joint_gains(message, limits, gains, why); });
+  judge(command_t::TASK_GAINS, [&] { return copy_task_gains(message, limits, gains, why); });
+  judge_ratio(command_t::JOINT_GAINS, command_t::JOINT_RATIO, "joint_damping_ratio",
+              message.joint_damping_ratio, gains.joint_damping_ratio);
+  judge_ratio(command_t::TASK_GAINS, command_t::TASK_RATIO, "task_damping_ratio",
+              message.task_damping_ratio, gains.task_damping_ratio);
+  judge(command_t::PAYLOAD, [&] { return copy_payload(message, limits, command.payload, why); });
+  judge(command_t::TOOL_FRAME, [&] {
+    return copy_pose(why, "tool_position's distance", message.tool_position,
+                     message.tool_quaternion, limits.tool_distance, command.tool);
+  });
+  judge(command_t::TIP_SPEED,
+        [&] { return copy_tip_speed(message, limits, command.tip_speed, why); });
+  judge(command_t::NULL_GAINS, [&] { return copy_null_gains(message, limits, gains, why); });
   command.parts |= message.parts;
   ++command.accepted;
   for (std::size_t bit = 0; bit < command.set_by.size(); ++bit) {

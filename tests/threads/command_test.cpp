@@ -9,6 +9,7 @@
 #include <cmath>
 #include <csignal>
 #include <string>
+#include <tuple>
 #include <utility>
 
 namespace dashpot::tests {
@@ -43,10 +44,38 @@ TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
     return live.modes.num_modes >= 6 && std::abs(live.modes.damping_ratio[0] - 0.9) < 0.05;
   })) << "fault "
       << int{live.state.fault} << ", mode " << int{live.state.mode};
-  // What the loop refuses is an error of the program's, with the loop's reason.
-  const Outcome far = command(live, {"--joint-position", "0,-0.8,0,-2.4,0,1.6,40"});
-  EXPECT_EQ(far.status, 1);
-  EXPECT_THAT(far.err, HasSubstr("dashpot command: refused: "));
+  // What the loop refuses is an error of the program's, with the number and its limits.
+  for (const auto& [option, numbers, reason] :
+       {std::tuple("--joint-position", "0,-0.8,0,-2.4,0,1.6,40",
+                   "--joint-position is beyond limits.position_lower, _upper, or in deg without"),
+        {"--tip-position", "500,0,400",
+         "tip_position's distance is 640.312, the limits are 0 to "
+         "3: is it in mm?"},
+        {"--wrench", "300,0,0,0,0,0", "wrench's force is 300, the limits are -200 to 200"}}) {
+    const Outcome far = command(live, {option, numbers});
+    EXPECT_EQ(far.status, 1);
+    EXPECT_THAT(far.err,
+                AllOf(HasSubstr("dashpot command: refused: out of limits: "), HasSubstr(reason)));
+  }
+  // What is likely to be meant otherwise does not reach the loop.
+  std::string last;
+  for (const int i : {1, 2, 3, 0}) {
+    last += (last.empty() ? "" : ",") + std::to_string(live.state.reference_tip_quaternion[i]);
+  }
+  for (const auto& [words, reason] :
+       {std::pair(Words{"--stiffness", "20,20,20,200,200,200", "--damping-ratio", "0.7"},
+                  "is much beside 20 N/m against translation, which stands first"),
+        {Words{"--stiffness", "400,400,400,20,20,20", "--damping", "0.7,0.7,0.7,1,1,1"},
+         "task damping: 0.7 is little beside a stiffness of 400 N/m: is it a damping ratio?"},
+        {Words{"--joint-stiffness", "300", "--joint-damping", "0.7"},
+         "joint damping: 0.7 is little beside a stiffness of 300 N m/rad"},
+        {Words{"--tip-quaternion", last}, "w comes first; --anyway sends it"}}) {
+    expect_refusal(command(live, words), reason);
+  }
+  EXPECT_EQ(
+      command(live, {"--stiffness", "20,20,20,200,200,200", "--damping-ratio", "0.7", "--anyway"})
+          .out,
+      "accepted\n");
   expect_refusal(command(live, {"--release"}), "--release: no fault is latched");
   expect_refusal(command(live, {}), "says nothing");
   expect_refusal(command(live, {"--stiffness", "1,1,1,1,1,1"}),
