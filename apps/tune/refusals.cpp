@@ -18,6 +18,16 @@ nlohmann::ordered_json refusal_json(const std::string& key, const std::string& r
 
 }  // namespace
 
+nlohmann::ordered_json warnings(const TunedArm& arm, const TunedDesign& design) {
+  nlohmann::ordered_json result = nlohmann::ordered_json::array();
+  for (const std::string& one : arm.model().warnings()) result.push_back(refusal_json("arm", one));
+  if (design.stated.inertia_blocks) return result;
+  for (const std::string& one : controller::doubtful_gains(arm.model(), design.stated.gains)) {
+    result.push_back(refusal_json("gains", one));
+  }
+  return result;
+}
+
 nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
                                 const controller::JointVector& q) {
   nlohmann::ordered_json result = nlohmann::ordered_json::array();

@@ -52,13 +52,6 @@ std::vector<controller::JointVector> listed(const TuneOptions& options,
   return some;
 }
 
-/// The task of the paper's Discussion: its stiffness and its C_C1, see docs/tuning-page.md.
-nlohmann::ordered_json paper_design() {
-  controller::Matrix6 C = controller::Vector6{0.1, 0.1, 0.1, 10, 10, 1}.asDiagonal();
-  C(2, 4) = C(4, 2) = 10;
-  return {{"stiffness", {3000, 3000, 3000, 100, 100, 100}}, {"damping", json_rows(C)}};
-}
-
 /// The posture of --q, else the start of the configuration's scenario, else the usual one.
 controller::JointVector posture_of(const TuneOptions& options,
                                    const controller::RobotModel& model) {
@@ -97,7 +90,6 @@ TuneSite make_site(const TuneOptions& options) try {
   a["null_stiffness"] = json_list(Eigen::VectorXd::Zero(arm.model().dof()));
   a["null_damping"] = a["null_stiffness"];
   a["damping"] = {{"factor", 2}};
-  if (!own) a.update(paper_design());
   auto b = a;
   b["damping"] = {{"ratio", 0.7}};
   PostureOption posture = options.posture;
@@ -164,8 +156,8 @@ void add_tune(CLI::App& program) {
       ->check(CLI::Range(0, 65535))
       ->option_text("N (" + std::to_string(kTunePort) + ")");
   command->footer(
-      "Without CONFIG and --urdf it shows a Panda with the damping C_C1 of the paper beside a\n"
-      "damping ratio of 0.7. The page computes; it commands no robot and writes no file.\n" +
+      "Without CONFIG and --urdf it shows a Panda. A has D = 2 sqrt(K), B a damping ratio of 0.7.\n"
+      "The page computes; it commands no robot and writes no file.\n" +
       std::string(kExitStatusHelp));
   command->callback([options] { run_tune(*options); });
 }

@@ -23,6 +23,7 @@ namespace {
 using TunePage = nlohmann::ordered_json;
 
 constexpr std::size_t kMostArms = 8;
+constexpr const char* kPaper = "the paper's Discussion, C_C1";
 
 HttpAnswer answer_of(unsigned status, const TunePage& document) {
   return {status, "application/json", std::make_shared<const std::string>(line_of(document))};
@@ -39,7 +40,8 @@ std::string random_token() {
   return token;
 }
 
-/// The gains of public controllers as designs.
+/// The gains of public controllers as designs, and the task of the paper's Discussion: its
+/// stiffness and its C_C1, see docs/tuning-page.md.
 TunePage presets_json(int n) {
   TunePage list = TunePage::array();
   for (const GainPreset& preset : kPresets) {
@@ -57,6 +59,14 @@ TunePage presets_json(int n) {
            {"rotation", preset.half_quaternion ? "half-quaternion" : "vector"},
            {"inertia_blocks", preset.inertia_blocks}}}});
   }
+  controller::Matrix6 C = controller::Vector6{0.1, 0.1, 0.1, 10, 10, 1}.asDiagonal();
+  C(2, 4) = C(4, 2) = 10;
+  list.push_back({{"name", kPaper},
+                  {"design",
+                   {{"mode", "cartesian"},
+                    {"frame", "base"},
+                    {"stiffness", {3000, 3000, 3000, 100, 100, 100}},
+                    {"damping", json_rows(C)}}}});
   return list;
 }
 
@@ -160,6 +170,7 @@ TunePage TuneSite::answer(const std::string& path, const TunePage& asked) {
   const controller::JointVector q = posture(wanted(asked, "q"), arm.model());
   TunePage result = TunedLoop(arm, design).at(q, place.get<std::string>());
   result["refused"] = refusals(arm, design, q);
+  result["warned"] = warnings(arm, design);
   return result;
 }
 

@@ -53,6 +53,10 @@ class TunedLoop {
   analysis::Gears gears_;
 };
 
+/// Returns what `dashpot audit` would warn of, in the arm and in the gains: a list of {"key",
+/// "reason"}.
+nlohmann::ordered_json warnings(const TunedArm& arm, const TunedDesign& design);
+
 /// Returns what the controller would refuse of a design at a posture, and under the key "q" what is
 /// wrong with the posture: a list of {"key", "reason"}.
 nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,

@@ -95,6 +95,10 @@ class Tune(unittest.TestCase):
         self.value(f'dashpot.store.edit((state) => {{ {change} }}, true)')
         self.settle()
 
+    def paper(self):
+        """Gives A the gains of the paper, and B its stiffness."""
+        self.edit("const paper = dashpot.setup.presets.at(-1).design; Object.assign(state.a, structuredClone(paper)); state.b.stiffness = [...paper.stiffness]")
+
     def set(self, selector, value, event='change'):
         self.value(f'''(() => {{ const e = document.querySelector({json.dumps(selector)}); e.value = {json.dumps(value)};
             e.dispatchEvent(new Event('{event}', {{bubbles: true}})); }})()''')
@@ -155,6 +159,7 @@ class Tune(unittest.TestCase):
         self.assertGreater(max(abs(complex(*a) - complex(*b)) for a, b in zip(found, before)), 0.1)
 
     def test_table_shows_the_numbers_of_analyze(self):
+        self.paper()
         self.field('damping', '20', 3 * 6 + 3)  # of the full matrix, entry rx rx
         told = self.analyze()
         rows = self.value("[...document.querySelectorAll('#rows tr')].map((r) => [...r.children].map((c) => c.textContent.trim()))")
@@ -255,6 +260,7 @@ class Tune(unittest.TestCase):
         self.same_modes(json.loads(run(*words[1:], '--json'))['posture']['modes'], self.value('dashpot.answers.a.modes'))
 
     def test_says_that_a_sampled_loop_is_unstable(self):
+        self.paper()
         self.edit("state.edited = 'a'; state.a.damping = {ratio: 0.7}")
         words = "document.getElementById('limits').textContent"
         self.assertNotIn('unstable', self.value(words))
@@ -361,10 +367,13 @@ class Tune(unittest.TestCase):
         self.browser.until(f'dashpot.store.state.q[0] > {before}')
 
     def test_marks_what_the_controller_refuses(self):
+        self.paper()
         self.browser.until("document.getElementById('refused').textContent.includes('not positive semidefinite')")
         self.assertTrue(self.value("document.querySelector('#gains [data-key=damping].matrix').classList.contains('bad')"))
         self.edit("state.a.damping = {ratio: 0.7}")
         self.browser.until("document.getElementById('refused').children.length == 0")
+        self.edit("state.a.damping = Array(6).fill(0.7)")
+        self.browser.until("document.getElementById('refused').textContent.includes('Warning: task damping: 0.7 is little beside')")
         self.refused = True
         self.value("dashpot.store.edit((state) => { state.a.stiffness[0] = -5; }, true)")
         self.browser.until("document.getElementById('refused').textContent.includes('task_stiffness')")
@@ -374,6 +383,7 @@ class Tune(unittest.TestCase):
         self.assertEqual(self.value("getComputedStyle(document.getElementById('rows')).opacity"), '1')
 
     def test_proposes_damping_of_the_wanted_ratio(self):
+        self.paper()
         for name, full in (('Propose a matrix', True), ('Propose a diagonal', False)):
             self.edit("state.a.damping = [1, 1, 1, 1, 1, 1]")
             self.value(f"[...document.querySelectorAll('#gains button')].find((b) => b.textContent == '{name}').click()")

@@ -309,7 +309,8 @@ function tellRefused() {
   } else {
     $('reads').textContent = '';
   }
-  $('refused').replaceChildren(...all.concat(outside()).map(({reason}) => {
+  const warned = (mine && !problem ? mine.warned : []).map(({reason}) => ({reason: `Warning: ${reason}`}));
+  $('refused').replaceChildren(...all.concat(outside(), warned).map(({reason}) => {
     const item = document.createElement('li');
     item.textContent = reason;
     return item;
