@@ -4,6 +4,7 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,9 @@ struct ModelCheck {
   /// Which columns look exchanged or turned around, and which joints' torques fit far better then;
   /// empty: none. The other results mean little until that is mended.
   std::vector<std::string> order;
+  /// The gravity with which whole torques fit, in the axes of the root link, m/s^2, where it is
+  /// another than the description's; the other results are those with it.
+  std::optional<Eigen::Vector3d> gravity;
   std::vector<std::string> ambiguities;  ///< what the records cannot tell apart
   std::vector<LeftOut> contacts;         ///< where other forces acted
   double used = 0;                       ///< s of motion

@@ -62,6 +62,7 @@ std::vector<ConfigChange> changes_for(const CheckModelOptions& options, const Co
       {{"robot", "coulomb_friction"},
        yaml_list(friction(check, &JointCheck::coulomb_friction,
                           config.model.joint_values(&Joint::coulomb_friction)))}};
+  if (check.gravity) changes.push_back({{"robot", "gravity"}, yaml_list(*check.gravity)});
   const controller::PayloadCheck& payload = check.payload;
   const bool center = std::all_of(payload.center.begin(), payload.center.end(),
                                   [](const Estimate& one) { return one.determined; });

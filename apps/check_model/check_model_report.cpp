@@ -100,6 +100,13 @@ std::string check_model_table(const CheckModelReport& report) {
                      format_number(check.window, 2) + " s\n" + kind_sentence(check.kind) + "\n" +
                      joints_table(report) + "\n" + payload_text(check);
   std::string doubts;
+  if (check.gravity) {
+    const Eigen::Vector3d& g = *check.gravity;
+    const std::string list =
+        format_number(g[0], 3) + ", " + format_number(g[1], 3) + ", " + format_number(g[2], 3);
+    doubts = "  gravity: the torques are those of an arm with robot.gravity: [" + list +
+             "], not as the model says: does it hang from a ceiling, or at a wall?\n";
+  }
   for (const std::string& one : check.order) doubts += "  " + one + "\n";
   for (std::size_t i = 0; i < check.joints.size(); ++i) {
     const std::string& reason = check.joints[i].suspicious;
@@ -165,6 +172,7 @@ Json check_model_json(const CheckModelReport& report) {
           {"payload", std::move(payload)},
           {"suspicious", std::move(suspicious)},
           {"order", check.order},
+          {"gravity", check.gravity ? Json(json_list(*check.gravity)) : Json()},
           {"ambiguities", check.ambiguities},
           {"left_out", std::move(left_out)},
           {"notes", report.notes}};

@@ -114,8 +114,17 @@ class Columns {
     return found;
   }
 
-  std::vector<Index> named(const std::string& names, const std::string& option) const {
+  std::vector<Index> named(Quantity quantity, const std::string& names,
+                           const std::string& option) const {
     std::vector<Index> chosen = chosen_channels(file_.channels, names, {}, option);
+    const std::string turns = quantity == Quantity::kTorque ? "N m" : "rad";
+    const std::string slides = quantity == Quantity::kTorque ? "N" : "m";
+    for (const Index i : chosen) {
+      const MotionChannel& channel = file_.channels[static_cast<std::size_t>(i)];
+      if (channel.unit.empty() || channel.unit == turns || channel.unit == slides) continue;
+      throw InputError(option, channel.name + " is in " + channel.unit + ", " + turns + " or " +
+                                   slides + " is wanted");
+    }
     if (chosen.size() != static_cast<std::size_t>(model_.dof())) {
       throw InputError(option, std::to_string(chosen.size()) + " columns, the model has " +
                                    std::to_string(model_.dof()) + " joints");
@@ -125,7 +134,7 @@ class Columns {
 
   std::vector<Index> take(Quantity quantity, const std::string& names, const std::string& option,
                           const char* what, std::vector<std::string>& notes) const {
-    if (!names.empty()) return named(names, option);
+    if (!names.empty()) return named(quantity, names, option);
     if (const auto found = find(quantity, notes)) return *found;
     std::string known;
     for (const MotionChannel& channel : file_.channels) {
@@ -197,6 +206,21 @@ void check_values(const TorqueFile& file) {
         throw InputError((*names)[static_cast<std::size_t>(j)], "is 0 throughout");
       }
     }
+  }
+}
+
+/// Notes torques beyond what the joints give.
+void note_torques(TorqueFile& file, const RobotModel& model) {
+  constexpr double kTimes = 3;  // what a joint may give for a moment
+  for (Index j = 0; j < file.record.torque.rows(); ++j) {
+    const Joint& joint = model.joints()[static_cast<std::size_t>(j)];
+    const double most = file.record.torque.row(j).cwiseAbs().maxCoeff<Eigen::PropagateNumbers>();
+    if (!(most > kTimes * joint.effort)) continue;
+    const char* unit = joint.type == controller::JointType::kPrismatic ? " N" : " N m";
+    file.notes.push_back(file.torques[static_cast<std::size_t>(j)] + " is up to " +
+                         short_text(most) + unit + ", the effort limit of joint '" + joint.name +
+                         "' is " + short_text(joint.effort) + unit + ": is it in" + unit + "?");
+    return;
   }
 }
 
@@ -279,6 +303,7 @@ TorqueFile read_torque_file(const std::string& path, const RobotModel& model,
   }
   check_values(result);
   check_positions(result, model);
+  note_torques(result, model);
   check_velocities(result, columns);
   return result;
 } catch (const InputError& error) {

@@ -39,6 +39,7 @@ std::optional<Conversion> to_si_as_written(std::string unit) {
         std::pair("radians", "rad"), std::pair("\xC2\xB0/s", "deg/s")}) {
     if (unit == name) unit = usual;
   }
+  if (unit.empty()) return std::nullopt;
   if (unit == "ns") return Conversion{"s", 1e-9};
   for (const char* si : {"s", "rad", "m", "rad/s", "m/s", "N m", "N"}) {
     try {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <sstream>
 
 namespace dashpot::apps {
 namespace {
@@ -290,16 +291,33 @@ class CsvReader {
     if (file_.channels.empty()) throw InputError("", "no column of numbers but the time");
   }
 
-  /// A time without a unit whose steps are no seconds is in ms, us or ns.
+  /// A time without a unit whose steps are no seconds is in ms, us or ns. One with a unit is asked
+  /// about where its steps are hardly those of a record.
   void scale_time() {
     const auto column = std::find_if(columns_.begin(), columns_.end(),
                                      [](const CsvColumn& one) { return one.time; });
-    if (column == columns_.end() || !column->guessed || hints_.rate > 0) return;
+    if (column == columns_.end()) return;
+    if (hints_.rate > 0) {
+      file_.notes.push_back(column->name + " is not read, --rate stands in its place");
+      return;
+    }
     const Eigen::Index count = file_.time.size() - 1;
     Eigen::VectorXd steps = file_.time.tail(count) - file_.time.head(count);
     std::nth_element(steps.begin(), steps.begin() + count / 2, steps.end());
     const double step = steps[count / 2];
     constexpr double kSlow = 0.04, kSlowest = 0.5;  // s; as ms they are 25 kHz and 2 kHz
+    constexpr double kFastest = 2e-5;               // s
+    if (!column->guessed) {
+      if (step < kSlowest && step > kFastest) return;
+      std::ostringstream text;
+      text << column->name << " has steps of " << step << " s: is it in "
+           << (step < kSlowest          ? "s"
+               : step < 1000 * kSlowest ? "ms"
+                                        : "us")
+           << "? Frequencies are others then";
+      file_.notes.push_back(text.str());
+      return;
+    }
     if (step < kSlow) return;
     constexpr double kMost = 500;  // times a unit: 0.5 s in ms, where us begin
     const auto [unit, factor] = step < kSlowest       ? std::pair("s", 1.0)

@@ -119,6 +119,16 @@ class Fitting {
     return sum;
   }
 
+  /// After a fit, the largest share of a joint's largest torque that is left over.
+  double most_left() const {
+    double most = 0;
+    for (Index j = 0; j < n_; ++j) {
+      if (moves_[static_cast<std::size_t>(j)])
+        most = std::max(most, result_.sigma[j] / largest_[j]);
+    }
+    return most;
+  }
+
   /// After a fit, adds the hypothesis that explains most, as long as one explains much.
   void explain(const RobotDescription& robot, ModelCheck& check) {
     hypotheses_ = list_hypotheses(robot, model_, form_, model_torque_);
@@ -497,6 +507,28 @@ ModelCheck check_model(const RobotDescription& robot, const std::vector<TorqueRe
   for (const TorqueKind kind : {TorqueKind::kWithoutGravity, TorqueKind::kExternal}) {
     const double score = fitting.fit(kind);
     if (best - score > kFarBetter) best = score, check.kind = kind;
+  }
+  constexpr double kMuchLeft = 0.05;
+  fitting.fit(check.kind);
+  if (check.kind != TorqueKind::kWhole || fitting.most_left() > kMuchLeft) {
+    RobotDescription hung = robot;  // from a ceiling, or at a wall
+    double least = best - kFarBetter;
+    for (int k = 0; k < 6; ++k) {
+      RobotDescription other = robot;
+      other.options.gravity =
+          (k < 3 ? 1 : -1) * robot.options.gravity.norm() * Eigen::Vector3d::Unit(k % 3) +
+          Eigen::Vector3d::Zero();  // no zero with a sign
+      const RobotModel hanging = other.model();
+      const double score = Fitting(hanging, runs, how, form).fit(TorqueKind::kWhole);
+      if (score < least) least = score, hung = other;
+    }
+    if (least < best - kFarBetter) {
+      ModelCheck there = check_model(hung, records);
+      if (there.kind == TorqueKind::kWhole && there.order.empty()) {
+        there.gravity = hung.options.gravity;
+        return there;
+      }
+    }
   }
   const JointOrder order = find_order(model, runs, how);
   if (!order.joints().empty()) {

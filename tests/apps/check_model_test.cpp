@@ -1,6 +1,6 @@
 // `dashpot check-model`: what a user sees, and what is refused.
 #include <dashpot/lcmtypes/driver.hpp>
-#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/torque_record.hpp>
 
@@ -130,6 +130,20 @@ TEST(CheckModelProgram, FindsColumnsByJointNamesAndUnits) {
   EXPECT_THAT(wrong["order"].dump(), HasSubstr("1, 4, 3, 2, 5, 6, 7"));
 }
 
+TEST(CheckModelProgram, WritesTheGravityOfAnArmThatHangs) {
+  const Scratch scratch;
+  const std::string up = panda_config(scratch),
+                    file = scratch.write("a.csv", csv(numbered("q"), 1, numbered("tau"), kInOrder));
+  std::string text = text_of(up);
+  text.replace(text.find("robot:"), 6, "robot:\n  gravity: [0, 0, 9.81]");
+  const std::string down = scratch.write("down.yaml", text), mended = scratch.path("mended.yaml");
+  const Outcome table = run_program({"check-model", file, "--config", down, "--write", mended});
+  EXPECT_THAT(table.out, HasSubstr("those of an arm with robot.gravity: [0, 0, -9.81], not as"));
+  EXPECT_THAT(text_of(mended), HasSubstr("gravity: [0, 0, -9.81]"));
+  EXPECT_EQ(check({file, "--config", mended})["gravity"], Json());
+  EXPECT_EQ(check({file, "--config", down})["gravity"], Json({0, 0, -9.81}));
+}
+
 TEST(CheckModelProgram, RefusesInOneLineThatNamesTheColumn) {
   const Scratch scratch;
   const std::string config = panda_config(scratch);
@@ -139,6 +153,9 @@ TEST(CheckModelProgram, RefusesInOneLineThatNamesTheColumn) {
   expect_refusal(outcome, "far beyond the limits of joint 'panda_joint1' in rad; degrees need");
   EXPECT_THAT(outcome.err, HasSubstr("deg.csv: q1: "));
   std::string text = csv(numbered("q"), 1, numbered("tau"), kInOrder);
+  expect_refusal(run_program({"check-model", scratch.write("q.csv", text), "--config", config,
+                              "--torques", "q1,q2,q3,q4,q5,q6,q7"}),
+                 "--torques: q1 is in rad, N m or N is wanted");
   text.replace(text.find('\n', 2000) + 1, 1, "x");
   expect_refusal(run_program({"check-model", scratch.write("x.csv", text), "--config", config}),
                  "x.csv: line ");

@@ -108,6 +108,17 @@ TEST(IdentifyFiles, TakesTimesAsTheyAreWritten) {
   }
 }
 
+TEST(IdentifyFiles, AskAboutUnitsOfTimeThatHardlyFit) {
+  const Scratch scratch;
+  for (const auto& [heading, by, question] :
+       {std::tuple("t [s],q1,q2", 2.0, "t has steps of 2 s: is it in ms?"),
+        {"t [ms],q1,q2", 0.002, "t has steps of 2e-06 s: is it in s?"}}) {
+    const std::string file = scratch.write(
+        "a.csv", stamped(heading, [step = by](int i) { return printed("%.3f", step * i); }));
+    EXPECT_THAT(identify({file})["notes"].dump(), HasSubstr(question));
+  }
+}
+
 /// Each is what a recorder or a spreadsheet makes of it, and none of it changes the modes.
 TEST(IdentifyFiles, TakesWhatRecordersAddAndLeaveOut) {
   const Scratch scratch;

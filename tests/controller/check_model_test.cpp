@@ -209,6 +209,19 @@ TEST(CheckModel, SaysWhichPartOfTheModelTheTorquesContain) {
   expect_no_doubt(check);
 }
 
+TEST(CheckModel, TellsHowAnArmHangs) {
+  RecordedArm arm = loaded_panda();
+  for (const Eigen::Vector3d& gravity :
+       {Eigen::Vector3d(0, 0, 9.81), Eigen::Vector3d(-9.81, 0, 0)}) {
+    arm.description.options.gravity = gravity;
+    const ModelCheck check = check_model(panda(), {arm.record(4)});
+    ASSERT_TRUE(check.gravity);
+    EXPECT_EQ(*check.gravity, gravity);
+    expect_loaded_panda(check, 0.02, 0.004);
+    expect_no_doubt(check);
+  }
+}
+
 TEST(CheckModel, NamesExchangedColumnsAndWrongSigns) {
   const TorqueRecord right = loaded_panda().record(7);
   TorqueRecord record = right;
