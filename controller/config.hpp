@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dashpot::controller {
 
@@ -22,6 +23,7 @@ struct Config {
   RobotDescription robot;
   RobotModel model;
   Settings settings;
+  std::vector<std::string> notes = {};  ///< what stands in the file and does nothing, a line each
 };
 
 /// Reads a configuration from a YAML file. The path of the URDF in it is relative to the directory

@@ -78,6 +78,13 @@ void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<Name
       if (!same_file(output, other)) continue;
       throw InputError(output.what, "is the same file as " + other.what);
     }
+    const std::string kind = fs::path(output.path).extension();
+    const bool told = output.what == "--write" || output.what == "--output";  // configurations
+    std::error_code none;
+    for (const char* kept : {".yaml", ".yml", ".urdf", ".xacro", ".xml"}) {
+      if (told || kind != kept || !fs::exists(output.path, none)) continue;
+      throw InputError(output.what, output.path + ": is there already, and no file of this kind");
+    }
     others.push_back(output);
   }
 }

@@ -18,6 +18,7 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <tuple>
 #include <utility>
 
 namespace dashpot::apps {
@@ -149,6 +150,23 @@ void check_files(const Options& options, const Scene& scene) {
       inputs);
 }
 
+/// Names what the scene's drives and sensors do that modes and margin are computed without.
+void note_unknown(const Scene& scene) {
+  const auto& known = scene.arm->config.settings.analysis.sampled;
+  const sim::PlantOptions& plant = scene.plant;
+  const bool low =
+      plant.torque_cutoff > 0 && (known.cutoff == 0 || plant.torque_cutoff < known.cutoff);
+  for (const auto& [unknown, simulated, key] :
+       {std::tuple(plant.delay > known.delay, "drives.delay", "delay"),
+        {low, "drives.cutoff", "cutoff"},
+        {plant.difference_velocity && !known.difference_velocity, "sensors.difference_velocity",
+         "difference_velocity"}}) {
+    if (!unknown) continue;
+    print_error(std::string("note: simulation.") + simulated + " is not in analysis.sampled." +
+                key + ": the sampled modes and the gain margin are not those of this loop");
+  }
+}
+
 void run(const Options& options) {
   if (options.commands && options.fast) {
     throw InputError("--commands",
@@ -167,7 +185,10 @@ void run(const Options& options) {
     excitation = read_excitation(options.excite, scene.arm->config.settings);
   }
   if (options.duration) scene.duration = *options.duration;
-  if (scene.arm) warn_of(scene.arm->config);
+  if (scene.arm) {
+    warn_of(scene.arm->config);
+    note_unknown(scene);
+  }
   std::optional<PluginLibrary> plugin;
   if (scene.arm) plugin.emplace(options.plugin);
   if (!scene.arm && !options.plugin.empty()) {

@@ -213,6 +213,19 @@ void check(const Settings& settings, const RobotModel& model, const YamlNode& do
   }
 }
 
+/// Names gains that do nothing in the mode in which the controller begins, and may be all that was
+/// meant.
+std::vector<std::string> unused(const YamlNode& document, Mode mode) {
+  const bool joint = mode == Mode::kJoint;
+  const std::string used = joint ? "gains.joint" : "gains.task";
+  const std::string other = joint ? "gains.task" : "gains.joint";
+  const int line = line_of(document, other, true);
+  if (line == 0 || line_of(document, used, true) > 0) return {};
+  return {other + " (line " + std::to_string(line) + ") does nothing in control.mode: " +
+          (joint ? "joint" : "cartesian") + ", in which the default " + used + " acts: is " +
+          "control.mode: " + (joint ? "cartesian" : "joint") + " meant?"};
+}
+
 }  // namespace
 
 Config read_config(const YamlNode& document, const std::filesystem::path& directory) {
@@ -227,7 +240,7 @@ Config read_config(const YamlNode& document, const std::filesystem::path& direct
   for_each_setting(settings, reader);
   read_walls(reader.section("limits"), settings.limits.walls);
   check(settings, model, document);
-  return {robot, model, settings};
+  return {robot, model, settings, unused(document, settings.initial.mode)};
 }
 
 Config load_config(const std::string& path) try {

@@ -68,12 +68,31 @@ TEST(Mistakes, InGainsOfTheTaskAreAskedAbout) {
   };
   EXPECT_EQ(said("200,200,200,20,20,20", "20,20,20,2,2,2"), "");
   EXPECT_EQ(said("200,200,200,20,20,20", "3,3,3,3,3,3"), "");
+  EXPECT_EQ(said("3,3,3,0.2,0.2,0.2", "3,3,3,0.3,0.3,0.3"),
+            "warning: task stiffness: 3 N/m hardly holds a tip: is it in N/mm?\n");
+  EXPECT_EQ(
+      run_program(of_panda("audit", {"--joint-stiffness", "600", "--joint-damping", "0.7"})).err,
+      "warning: joint damping: 0.7 is little beside a stiffness of 600 N m/rad: is it a "
+      "damping ratio?\n");
   EXPECT_THAT(said("200,200,200,20,20,20", "0.7,0.7,0.7,0.7,0.7,0.7"),
-              ::testing::HasSubstr("task damping: 0.7 in all directions is little beside"));
+              ::testing::HasSubstr("task damping: 0.7 is little beside a stiffness"));
+  EXPECT_THAT(said("200,200,200,20,20,20", "0.7,0.7,0.7,1,1,1"),
+              ::testing::HasSubstr("a damping ratio?"));
   EXPECT_THAT(said("20,20,20,2000,2000,2000", "20,20,20,2,2,2"),
               ::testing::HasSubstr("task stiffness: 2000 N m/rad against rotation is much"));
   EXPECT_THAT(said("200,200,200,20,20,20", "2,2,2,300,300,300"),
               ::testing::HasSubstr("task damping: 300 N s m/rad against rotation is much"));
+}
+
+TEST(Mistakes, OfASimulationThatTheAnalysisDoesNotKnowAreNoted) {
+  const Scratch scratch;
+  const std::string changed_scene =
+      changed(scratch, "iiwa14", "sampled: {delay: 1, difference_velocity: true}", "sampled: {}");
+  const std::string said = run_scene(changed_scene, {"--duration", "0.05"}).err;
+  for (const char* key : {"drives.delay", "sensors.difference_velocity"}) {
+    EXPECT_THAT(said, ::testing::HasSubstr("note: simulation." + std::string(key) + " is not in "));
+  }
+  EXPECT_EQ(run_scene(scene("iiwa14"), {"--duration", "0.05"}).err, "");
 }
 
 TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
@@ -91,6 +110,9 @@ TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
   EXPECT_THAT(heavy.err, ::testing::HasSubstr("warning: payload: its mass, 800 kg, "));
   EXPECT_THAT(heavy.err, ::testing::HasSubstr(": is it in g, or "));
   EXPECT_EQ(run_program(joined(audit, {"--payload", "0.8"})).err, "");
+  EXPECT_THAT(
+      run_program(joined(audit, {"--viscous-friction", "100"})).err,
+      ::testing::HasSubstr("viscous friction, 100, takes 217.5 N m, its effort limit is 87"));
   expect_refusal(run_program(joined(audit, {"--period", "1ms", "--delay", "2ms"})),
                  "--delay: a whole number of ticks from 0 to 100 is wanted, not '2ms'");
   expect_refusal(run_program(joined(audit, {"--delay", ""})), "from 0 to 100 is wanted, not ''");
@@ -134,6 +156,15 @@ TEST(Mistakes, OfOneFileForAnotherNameWhatTakesIt) {
                  ": is a configuration or scene, which dashpot run, ");
   expect_refusal(run_program({"run", example("chain3.yaml")}),
                  ": is a system of matrices, which dashpot analyze and design take");
+}
+
+TEST(Mistakes, DoNotReplaceAConfigurationByATable) {
+  const Scratch scratch;
+  const std::string config = scratch.write("arm.yaml", "a: 1");
+  expect_refusal(run_program(joined(of_panda("audit", kStiffness),
+                                    {"--damping-factor", "2", "--samples", "5", "--csv", config})),
+                 "--csv: " + config + ": is there already, and no file of this kind");
+  EXPECT_EQ(scratch.read("arm.yaml"), "a: 1");
 }
 
 TEST(Mistakes, InKindsOfFilesAreNamed) {

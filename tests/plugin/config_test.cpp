@@ -29,6 +29,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::kInfinity;
 
@@ -204,6 +205,19 @@ TEST(Config, TakesADampingRatioInPlaceOfADamping) {
   // Where no spring is left, nothing can be designed.
   EXPECT_GT(gains("joint", "stiffness: 0, damping_ratio: 0.8").joint_damping.diagonal().minCoeff(),
             0);
+}
+
+TEST(Config, NotesGainsThatDoNothing) {
+  const std::string task = "gains: {task: {damping_ratio: 0.8}}\n";
+  const std::string joint = "gains: {joint: {damping_ratio: 0.8}}\n";
+  const std::string cartesian = "control: {mode: cartesian}\n";
+  EXPECT_THAT(load(panda() + task).notes,
+              ElementsAre(HasSubstr("gains.task (line 2) does nothing in control.mode: joint")));
+  EXPECT_THAT(load(panda() + cartesian + joint).notes,
+              ElementsAre(HasSubstr("gains.joint (line 3) does nothing in control.mode: cart")));
+  for (const std::string& right : {joint, cartesian + task, cartesian}) {
+    EXPECT_THAT(load(panda() + right).notes, IsEmpty());
+  }
 }
 
 TEST(Config, FillsTheTask) {
