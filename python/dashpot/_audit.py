@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+import warnings
 from typing import Any, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from ._core import Error
+from ._core import Error, Gains
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers
 from ._robot import DIRECTIONS, Robot, check_postures, gains_text, selected
 from ._workers import Task, chunks_of, collect, workers
@@ -209,6 +210,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
         if values is not None:
             options[name] = to_numbers(name, values, 1)
     task = Task(robot._for_gains(urdf_friction), gains, at_tip, options)
+    for doubt in [] if inertia_blocks else Gains(robot._core, gains).doubts(robot._core):
+        warnings.warn(doubt, stacklevel=2)
     if isinstance(postures, Mapping):
         postures = _measured(robot, postures)
     given = None if postures is None else to_numbers("postures", postures, 2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from typing import Any, Mapping, Sequence
 
 import numpy as np
@@ -148,6 +149,9 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike] | Mapping[str, Any],
     many = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
     times: list[Any] = list(t) if many else [t]  # type: ignore[arg-type]
     instants = [to_numbers("t", time, 1) for time in times]
+    slowest = max((float(np.median(np.diff(time))) for time in instants if time.size > 1), default=0)
+    if slowest >= 0.5:
+        warnings.warn(f"t has steps of {slowest:.3g} s: is it in ms?", stacklevel=2)
     values = _columns("y", "channels", y, len(times), many)
     _check_rows("y", "channels", values, instants)
     if input is None:

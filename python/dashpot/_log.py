@@ -49,6 +49,10 @@ class LoggedMode(Result):
 class Log(Dict[str, Dict[str, npt.NDArray[Any]]]):
     """The channels (topics) of a log, each a dict of field to array."""
 
+    def __repr__(self) -> str:
+        return "\n".join(["Log", *(f"  {name}: {len(next(iter(fields.values()), ()))} messages of "
+                                   f"{len(fields)} fields" for name, fields in self.items())])
+
     @property
     def modes(self) -> dict[int, LoggedMode]:
         """Returns the modes on DASHPOT_MODES by label, which stays with a mode from message to

@@ -30,9 +30,9 @@ class Result:
         self.__post_init__()
 
     def __repr__(self) -> str:
-        lines = [f"  {field.name}: {_short(getattr(self, field.name))}"
+        lines = [f"{field.name}: {_short(getattr(self, field.name))}"
                  for field in dataclasses.fields(self)]
-        return "\n".join([type(self).__name__, *lines])
+        return "\n".join([type(self).__name__, *lines]).replace("\n", "\n  ")
 
 
 def _short(value: object) -> str:
@@ -43,6 +43,8 @@ def _short(value: object) -> str:
         return np.array2string(value, precision=6, max_line_width=10**6)
     if isinstance(value, Modes):
         return f"{len(value)} modes"
+    if isinstance(value, Result):
+        return repr(value)
     return " ".join(repr(value).split())
 
 

@@ -406,6 +406,8 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
             ("task", task_stiffness, task_damping, task_damping_ratio),
             ("null", null_stiffness, null_damping, null_damping_ratio)):
         one_damping(part, stiffness, damping, ratio)
+    for doubt in gains.doubts(robot._core):
+        warnings.warn(doubt, stacklevel=2)
     found = _core.closed_loop(robot._core, posture, gains, at_tip,
                               to_vector("external_wrench", external_wrench), kind, soft_frequency)
     return ClosedLoop(found["mass"], found["damping"], found["stiffness"],

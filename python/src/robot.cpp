@@ -10,6 +10,7 @@
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/python/src/analysis.hpp>
 #include <dashpot/python/src/robot.hpp>
 
@@ -181,7 +182,10 @@ void add_robot(nb::module_& m) {
         return to_array(dynamics(robot, q, qd).Jdot_qd);
       });
   nb::class_<Gains>(m, "Gains", "controller::Gains")
-      .def(nb::new_(&make_gains), nb::arg("robot"), nb::arg("text"));
+      .def(nb::new_(&make_gains), nb::arg("robot"), nb::arg("text"))
+      .def("doubts", [](const Gains& gains, const Robot& robot) {
+        return controller::doubtful_gains(robot.model, gains);
+      });
   m.def("closed_loop", &closed_loop, nb::arg("robot"), nb::arg("q"), nb::arg("gains"),
         nb::arg("cartesian"), nb::arg("external_wrench").none(), nb::arg("load"),
         nb::arg("soft_frequency"));

@@ -33,6 +33,22 @@ def test_a_posture_has_the_modes_of_the_closed_loop(panda):
     assert found.workspace is None
 
 
+@pytest.mark.parametrize("gains, question", [
+    (dict(task_stiffness=[400] * 3 + [20] * 3, task_damping=[0.7] * 6), "is it a damping ratio"),
+    (dict(task_stiffness=[20] * 3 + [400] * 3, task_damping=[9] * 6), "is the order another"),
+    (dict(joint_stiffness=[600] * 7, joint_damping=[0.7] * 7), "joint damping: 0.7 is little")])
+def test_doubtful_gains_are_asked_about(panda, gains, question):
+    for call in (dashpot.audit, dashpot.closed_loop):
+        with pytest.warns(UserWarning, match=question):
+            call(panda, HOME, **gains)
+
+
+def test_an_audit_prints_what_it_has_part_by_part(panda):
+    lines = repr(dashpot.audit(panda, HOME, **GAINS, damping_ratio=0.7)).splitlines()
+    assert lines[0] == "Audit" and "  workspace: None" in lines and "    modes: 6 modes" in lines
+    assert max(map(len, lines)) < 120 and len(lines) < 25
+
+
 def test_an_integral_counts_in_the_margin(panda):
     stiff = dict(task_stiffness=[150] * 3 + [250] * 3, damping_factor=2, inertia_blocks=True)
     plain = dashpot.audit(panda, HOME, **stiff, period=0.001).posture

@@ -36,6 +36,8 @@ def test_finds_the_modes_of_a_decay():
     assert np.array_equal(again.modes.natural_frequency, found.modes.natural_frequency)
     assert not again.modes.shapes.flags.writeable
     assert "rad/s" in repr(found.modes)
+    with pytest.warns(UserWarning, match="t has steps of 2 s: is it in ms?"):
+        dashpot.identify(1000 * t, y, find=False)
     with pytest.raises(dashpot.Error, match="samples x channels; give its transpose"):
         dashpot.identify(t, y.T)
 

@@ -22,6 +22,7 @@ def released(program, tmp_path_factory):
 def test_a_log_says_what_the_program_measured(released):
     log = dashpot.read_log(released / "log.lcm")
     states = log["DASHPOT_STATE"]
+    assert f"  DASHPOT_STATE: {len(states['tick'])} messages of {len(states)} fields" in repr(log)
     rows = list(csv.DictReader(open(released / "log.csv")))
     assert states["tick"].shape == (len(rows),)
     assert states["joint_position"].shape == (len(rows), 7)
