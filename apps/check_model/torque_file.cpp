@@ -122,8 +122,9 @@ class Columns {
     for (const Index i : chosen) {
       const MotionChannel& channel = file_.channels[static_cast<std::size_t>(i)];
       if (channel.unit.empty() || channel.unit == turns || channel.unit == slides) continue;
-      throw InputError(option, channel.name + " is in " + channel.unit + ", " + turns + " or " +
-                                   slides + " is wanted");
+      std::string text = channel.name;
+      text.append(" is in ").append(channel.unit).append(", ").append(turns);
+      throw InputError(option, text.append(" or ").append(slides).append(" is wanted"));
     }
     if (chosen.size() != static_cast<std::size_t>(model_.dof())) {
       throw InputError(option, std::to_string(chosen.size()) + " columns, the model has " +
@@ -209,17 +210,15 @@ void check_values(const TorqueFile& file) {
   }
 }
 
-/// Notes torques beyond what the joints give.
+/// Notes torques of more than three times what a joint gives.
 void note_torques(TorqueFile& file, const RobotModel& model) {
-  constexpr double kTimes = 3;  // what a joint may give for a moment
   for (Index j = 0; j < file.record.torque.rows(); ++j) {
-    const Joint& joint = model.joints()[static_cast<std::size_t>(j)];
+    const double effort = model.joints()[static_cast<std::size_t>(j)].effort;
     const double most = file.record.torque.row(j).cwiseAbs().maxCoeff<Eigen::PropagateNumbers>();
-    if (!(most > kTimes * joint.effort)) continue;
-    const char* unit = joint.type == controller::JointType::kPrismatic ? " N" : " N m";
-    file.notes.push_back(file.torques[static_cast<std::size_t>(j)] + " is up to " +
-                         short_text(most) + unit + ", the effort limit of joint '" + joint.name +
-                         "' is " + short_text(joint.effort) + unit + ": is it in" + unit + "?");
+    if (!(most > 3 * effort)) continue;
+    const std::string& name = file.torques[static_cast<std::size_t>(j)];
+    file.notes.push_back(name + " is up to " + short_text(most) + ", the joint's effort limit is " +
+                         short_text(effort) + ": is it in another unit?");
     return;
   }
 }

@@ -88,7 +88,8 @@ void ClosedLoop::guide(const JointVector& from, const JointVector& to, double du
     if (status >= DASHPOT_SETPOINT_REJECTED && !scene_.outside_limits) {
       throw InputError("scenario.start",
                        std::string("the controller does not take it: ") +
-                           controller::to_text(static_cast<controller::Status>(status)));
+                           controller::to_text(static_cast<controller::Status>(status)))
+          .in_file(scene_.path);
     }
   }
 }

@@ -126,8 +126,8 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
   }
   require(std::isfinite(options.soft_frequency) && options.soft_frequency > 0,
           "soft_frequency: has to be positive, rad/s");
-  require(std::isfinite(options.period) && options.period >= 0,
-          "period: must be finite and not negative, s");
+  require(options.period >= 0 && options.period <= 0.1,
+          "period: must be between 0 and 0.1 s; is it in ms?");
   require(options.delay >= 0, "delay: must not be negative, ticks");
   require(std::isfinite(options.cutoff) && options.cutoff >= 0,
           "cutoff: must be finite and not negative, Hz");

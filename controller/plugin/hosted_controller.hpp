@@ -102,6 +102,8 @@ std::int32_t finish(std::int32_t code, const char* text) noexcept;
 std::int32_t finish(std::int32_t code) noexcept;
 /// Likewise DASHPOT_OK, with something to be warned of.
 std::int32_t warn(const char* text) noexcept;
+/// Warns of what is doubtful about gains.
+void warn_of_gains(const HostedController& controller, const Gains& gains) noexcept;
 /// What is too little in a verdict of gains, found `here` or wherever the robot may be, in one
 /// line: the margin, what `became` of the gains, and what the model lacks that may be why.
 using VerdictText = std::array<char, 960>;

@@ -84,6 +84,7 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
     controller->judgement.where(q);
     code = judge_change(*controller, wanted, request.attachment, q);
     if (code != DASHPOT_OK) return code;
+    warn_of_gains(*controller, wanted);
   }
   request.setpoint.gains = wanted;
   ++request.gain_changes;

@@ -46,6 +46,14 @@ std::int32_t warn(const char* text) noexcept {
   return DASHPOT_OK;
 }
 
+void warn_of_gains(const HostedController& controller, const Gains& gains) noexcept {
+  try {
+    for (const std::string& doubt : doubtful_gains(controller.model, gains)) warn(doubt.c_str());
+  } catch (...) {  // out of memory
+    return;
+  }
+}
+
 VerdictText describe(Judgement& judgement, const GainJudge::Verdict& verdict, const Gains& gains,
                      bool here, const char* became) noexcept {
   VerdictText text{};
@@ -235,6 +243,7 @@ int32_t dashpot_start(dashpot_controller* controller, const double* position,
   if (code != DASHPOT_OK) return code;
   controller->judgement.locate(q);
   controller->reset(torque != nullptr ? acting : held);
+  warn_of_gains(*controller, controller->request.setpoint.gains);
   return slow.empty() ? DASHPOT_OK : warn(slow.c_str());
 }
 

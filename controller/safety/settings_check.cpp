@@ -288,10 +288,6 @@ void validate(const Settings& settings, const RobotModel& model) {
          "limits.beyond_model: true accepts it");
   }
   const Watchdog& watchdog = settings.watchdog;
-  if (watchdog.setpoint_hold > 0 && watchdog.setpoint_hold < settings.period) {
-    fail("watchdog.setpoint_hold", watchdog.setpoint_hold, "s",
-         "shorter than a period, " + number(settings.period) + " s: every set-point is too old");
-  }
   if (watchdog.setpoint_damp > 0 && watchdog.setpoint_damp < watchdog.setpoint_hold) {
     fail("watchdog.setpoint_damp", watchdog.setpoint_damp, "s",
          "before setpoint_hold, " + number(watchdog.setpoint_hold) + " s, which would never come");

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from typing import Any
 
 import numpy as np
@@ -250,6 +251,8 @@ def design_damping(M: npt.ArrayLike, K: npt.ArrayLike | None = None, *, damping_
     Raises Error as `modes` does.
     """
     high = damping_ratio if high_ratio is None else high_ratio
+    if max(damping_ratio, high) > 5:
+        warnings.warn(f"a damping ratio of {max(damping_ratio, high)} is no percentage", stacklevel=2)
     loop = None
     if period is not None:
         loop = _core.SampledLoop(period, delay, torque_cutoff, False, None, None,

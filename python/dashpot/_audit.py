@@ -188,6 +188,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     if not at_tip and not (task_stiffness is None and task_damping is None):
         raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
     factor_of = (damping_factor, None) if at_tip else (None, damping_factor)
+    if delay != int(delay):
+        raise Error(f"delay: {delay} is no whole number of ticks; is it in s?")
     chosen = selected(directions)
     stiffness = to_gain("task_stiffness", task_stiffness)
     damping = _damping(task_stiffness, task_damping, factor_of[0], "task_damping")
@@ -219,6 +221,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     if q is None and samples == 0 and damping_ratio is None:
         q = robot._core.default_posture()
     if not outside_limits:
+        check_postures(robot, "lower and upper", [options[k] for k in ("lower", "upper") if k in options])
         check_postures(robot, "q", [] if q is None else [to_numbers("q", q, 1)])
         check_postures(robot, "postures", [] if given is None else given)
     posture = workspace = suggestion = None

@@ -151,7 +151,7 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike] | Mapping[str, Any],
     instants = [to_numbers("t", time, 1) for time in times]
     slowest = max((float(np.median(np.diff(time))) for time in instants if time.size > 1), default=0)
     if slowest >= 0.5:
-        warnings.warn(f"t has steps of {slowest:.3g} s: is it in ms?", stacklevel=2)
+        warnings.warn(f"t has steps of {slowest:.3g} s: is it in ms, us or ns?", stacklevel=2)
     values = _columns("y", "channels", y, len(times), many)
     _check_rows("y", "channels", values, instants)
     if input is None:

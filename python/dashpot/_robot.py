@@ -54,6 +54,8 @@ def _options(*, gravity: npt.ArrayLike | None = None, include_off_chain: bool = 
                               "inertia": _sized("payload_inertia", payload_inertia, (3, 3))}
     if tool is not None:
         pose = np.array(_sized("tool", tool, (4, 4)))
+        if np.abs(pose[3] - [0, 0, 0, 1]).max() > 1e-9:
+            raise Error(f"tool: its last row is {pose[3].tolist()}, not 0, 0, 0, 1: is it transposed?")
         options["tool"] = {"position": pose[:3, 3].tolist(), "rpy": _mujoco.rpy_of(pose[:3, :3])}
     return options
 
@@ -245,30 +247,39 @@ class Robot:
         empty if all have."""
         return self._core.missing_rotors()
 
+    def _at(self, q: npt.ArrayLike) -> Array:
+        """Returns q as numbers; warns of what is many turns and fits in degrees."""
+        values = _joint_values("q", q)
+        if values.shape == (len(self),) and np.abs(values).max() > 13:
+            complaint = self._core.outside_limits(values)
+            if "degrees" in complaint:
+                warnings.warn(f"q: {complaint}", stacklevel=3)
+        return values
+
     def pose(self, q: npt.ArrayLike) -> Array:
         """Returns the pose of the tip at q (n, rad): 4 x 4, from the tip's axes into the base's."""
-        return self._core.pose(_joint_values("q", q))
+        return self._core.pose(self._at(q))
 
     def mass(self, q: npt.ArrayLike) -> Array:
         """Returns the mass matrix at q (n, rad): n x n, kg m^2."""
-        return self._core.mass(_joint_values("q", q))
+        return self._core.mass(self._at(q))
 
     def gravity(self, q: npt.ArrayLike) -> Array:
         """Returns the gradient of the potential energy at q (n, rad): n, N m, the torque that holds
         the arm."""
-        return self._core.gravity(_joint_values("q", q))
+        return self._core.gravity(self._at(q))
 
     def coriolis(self, q: npt.ArrayLike, qd: npt.ArrayLike) -> Array:
         """Returns C(q, qd) qd: n, N m."""
-        return self._core.coriolis(_joint_values("q", q), _joint_values("qd", qd))
+        return self._core.coriolis(self._at(q), _joint_values("qd", qd))
 
     def jacobian(self, q: npt.ArrayLike) -> Array:
         """Returns J at q (n, rad): 6 x n, the tip's twist is J qd, linear rows first."""
-        return self._core.jacobian(_joint_values("q", q))
+        return self._core.jacobian(self._at(q))
 
     def jacobian_dot_qd(self, q: npt.ArrayLike, qd: npt.ArrayLike) -> Array:
         """Returns dJ/dt qd: 6, the tip's acceleration without joint accelerations."""
-        return self._core.jacobian_dot_qd(_joint_values("q", q), _joint_values("qd", qd))
+        return self._core.jacobian_dot_qd(self._at(q), _joint_values("qd", qd))
 
 
 def published_drives() -> dict[str, dict[str, Any]]:

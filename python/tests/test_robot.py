@@ -153,6 +153,20 @@ def test_the_closed_loops_modes_are_those_of_the_program(program, panda):
     np.testing.assert_allclose(found.natural_frequency[:6], before[:6], rtol=2e-3)  # no friction
 
 
+def test_degrees_percent_and_transposed_tools_are_told(panda, config):
+    with pytest.warns(UserWarning, match="if these are degrees"):
+        panda.mass([0, -45, 0, -135, 0, 90, 45])
+    with pytest.warns(UserWarning, match="70 is no percentage"):
+        dashpot.design_damping([[1]], [[100]], damping_ratio=70)
+    arm = config["robot"]
+    with pytest.raises(dashpot.Error, match="tool: its last row is .*: is it transposed"):
+        dashpot.Robot.from_urdf(arm["urdf"], arm["base"], arm["tip"], tool=np.eye(4) + np.eye(4)[3, :, None] * [0, 0, .1, 0])
+    controller = dashpot.Controller({**config, "control": {"mode": "cartesian"}})
+    controller.start(HOME)
+    with pytest.warns(UserWarning, match="is it a damping ratio"):
+        controller.set_gains(task_stiffness=[400] * 3 + [20] * 3, task_damping=[0.7] * 6)
+
+
 def test_a_closed_loop_that_cannot_be_is_refused(panda):
     for given, message in [
             (dict(task_stiffness=np.eye(5)), "gains.task.stiffness: is 5 x 5; 6 x 6"),

