@@ -411,8 +411,9 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
  * compensates it). Refuses a position beyond the limits of the URDF, as that of degrees is, and a
  * torque that contradicts the weight (`watchdog.start_torque`; none accepts it). Takes some
  * milliseconds and allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error then says
- * more, and with DASHPOT_OK, where it is not empty, that limits.torque_rate makes stops slow. A
- * loop without this call starts from the weight as well, but with gains that were not judged at its
+ * more, and with DASHPOT_OK, where it is not empty, that limits.torque_rate makes stops slow, or
+ * that gains look like another unit or order, of which dashpot_set_gains warns as well. A loop
+ * without this call starts from the weight as well, but with gains that were not judged at its
  * posture. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 

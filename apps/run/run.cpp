@@ -18,7 +18,6 @@
 #include <memory>
 #include <optional>
 #include <thread>
-#include <tuple>
 #include <utility>
 
 namespace dashpot::apps {
@@ -150,21 +149,17 @@ void check_files(const Options& options, const Scene& scene) {
       inputs);
 }
 
-/// Names what the scene's drives and sensors do that modes and margin are computed without.
-void note_unknown(const Scene& scene) {
-  const auto& known = scene.arm->config.settings.analysis.sampled;
-  const sim::PlantOptions& plant = scene.plant;
-  const bool low =
-      plant.torque_cutoff > 0 && (known.cutoff == 0 || plant.torque_cutoff < known.cutoff);
-  for (const auto& [unknown, simulated, key] :
-       {std::tuple(plant.delay > known.delay, "drives.delay", "delay"),
-        {low, "drives.cutoff", "cutoff"},
-        {plant.difference_velocity && !known.difference_velocity, "sensors.difference_velocity",
-         "difference_velocity"}}) {
-    if (!unknown) continue;
-    print_error(std::string("note: simulation.") + simulated + " is not in analysis.sampled." +
-                key + ": the sampled modes and the gain margin are not those of this loop");
+/// Notes drives and sensors of the scene that are slower than those of which modes and margin are.
+void note_unknown(const sim::PlantOptions& plant, const controller::Analysis::Sampled& known) {
+  std::string unknown;
+  if (plant.delay > known.delay) unknown += " delay";
+  if (plant.torque_cutoff > 0 && (known.cutoff == 0 || plant.torque_cutoff < known.cutoff)) {
+    unknown += " cutoff";
   }
+  if (plant.difference_velocity && !known.difference_velocity) unknown += " difference_velocity";
+  if (unknown.empty()) return;
+  print_error("note: simulation has what analysis.sampled is not told:" + unknown +
+              "; the sampled modes and the gain margin are not those of this loop");
 }
 
 void run(const Options& options) {
@@ -187,7 +182,7 @@ void run(const Options& options) {
   if (options.duration) scene.duration = *options.duration;
   if (scene.arm) {
     warn_of(scene.arm->config);
-    note_unknown(scene);
+    note_unknown(scene.plant, scene.arm->config.settings.analysis.sampled);
   }
   std::optional<PluginLibrary> plugin;
   if (scene.arm) plugin.emplace(options.plugin);
