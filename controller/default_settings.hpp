@@ -8,12 +8,12 @@ namespace dashpot::controller {
 ///
 /// The limits of torque, velocity and position come from the URDF; where the URDF has none they are
 /// 100 N m, 2 rad/s and no position limit. Where no joint of an arm of four or more has a limit of
-/// effort, limits.torque is 0, which `validate` refuses: it has to be told. Torque changes by at most 1000 N m/s, or, if that is
-/// slower and for prismatic joints, by the whole torque limit in 10 ms. The margin before a
-/// position limit is a tenth of the range, at most 0.1 rad or 2 cm. A joint outside its limits
-/// returns with 0.05 rad/s or 1 cm/s. The reference moves at a quarter of the velocity limits. It
-/// accelerates so that it has the velocity limit after a second, or slower where the URDF's limits
-/// of acceleration, deceleration and jerk want that.
+/// effort, limits.torque is 0, which `validate` refuses: it has to be told. Torque changes by at
+/// most 1000 N m/s, or, if that is slower and for prismatic joints, by the whole torque limit in 10
+/// ms. The margin before a position limit is a tenth of the range, at most 0.1 rad or 2 cm. A joint
+/// outside its limits returns with 0.05 rad/s or 1 cm/s. The reference moves at a quarter of the
+/// velocity limits. It accelerates so that it has the velocity limit after a second, or slower
+/// where the URDF's limits of acceleration, deceleration and jerk want that.
 ///
 /// Stiffness suits the robot's inertia: 1.5 Hz for each joint alone in the middle of its range; at
 /// the tip 400 N/m and 20 N m/rad, or less where a mode with it would decay too fast for a loop of

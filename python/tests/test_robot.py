@@ -159,8 +159,10 @@ def test_degrees_percent_and_transposed_tools_are_told(panda, config):
     with pytest.warns(UserWarning, match="70 is no percentage"):
         dashpot.design_damping([[1]], [[100]], damping_ratio=70)
     arm = config["robot"]
+    tool = np.eye(4)
+    tool[3, 2] = 0.1
     with pytest.raises(dashpot.Error, match="tool: its last row is .*: is it transposed"):
-        dashpot.Robot.from_urdf(arm["urdf"], arm["base"], arm["tip"], tool=np.eye(4) + np.eye(4)[3, :, None] * [0, 0, .1, 0])
+        dashpot.Robot.from_urdf(arm["urdf"], arm["base"], arm["tip"], tool=tool)
     controller = dashpot.Controller({**config, "control": {"mode": "cartesian"}})
     controller.start(HOME)
     with pytest.warns(UserWarning, match="is it a damping ratio"):
