@@ -89,9 +89,9 @@ TuneSite make_site(const TuneOptions& options) try {
   a["mode"] = "cartesian";
   a["null_stiffness"] = json_list(Eigen::VectorXd::Zero(arm.model().dof()));
   a["null_damping"] = a["null_stiffness"];
-  a["damping"] = {{"factor", 2}};
+  a["damping"] = {{"ratio", 0.7}};
   auto b = a;
-  b["damping"] = {{"ratio", 0.7}};
+  b["damping"] = {{"factor", 2}};
   PostureOption posture = options.posture;
   if (!own && posture.q.empty()) posture.q = "0.1,-0.7,0.2,-1.9,0.1,1.4,0.6";
   const controller::JointVector q = posture.read(arm.model());
@@ -156,7 +156,7 @@ void add_tune(CLI::App& program) {
       ->check(CLI::Range(0, 65535))
       ->option_text("N (" + std::to_string(kTunePort) + ")");
   command->footer(
-      "Without CONFIG and --urdf it shows a Panda. A has D = 2 sqrt(K), B a damping ratio of 0.7.\n"
+      "Without CONFIG and --urdf it shows a Panda. A has a damping ratio of 0.7, B D = 2 sqrt(K).\n"
       "The page computes; it commands no robot and writes no file.\n" +
       std::string(kExitStatusHelp));
   command->callback([options] { run_tune(*options); });

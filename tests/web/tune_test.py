@@ -96,8 +96,8 @@ class Tune(unittest.TestCase):
         self.settle()
 
     def paper(self):
-        """Gives A the gains of the paper, and B its stiffness."""
-        self.edit("const paper = dashpot.setup.presets.at(-1).design; Object.assign(state.a, structuredClone(paper)); state.b.stiffness = [...paper.stiffness]")
+        """Gives A the gains of the paper, and B its stiffness and a ratio."""
+        self.edit("const paper = dashpot.setup.presets.at(-1).design; Object.assign(state.a, structuredClone(paper)); Object.assign(state.b, {stiffness: [...paper.stiffness], damping: {ratio: 0.7}})")
 
     def set(self, selector, value, event='change'):
         self.value(f'''(() => {{ const e = document.querySelector({json.dumps(selector)}); e.value = {json.dumps(value)};

@@ -21,7 +21,7 @@ def ratios(page):
 def begin(page):
     """Gives both designs the paper's stiffness, and design A the damping C_C0 = I."""
     page.value("""dashpot.store.edit((state) => { state.edited = "a"; state.a.damping = [1, 1, 1, 1, 1, 1];
-        for (const one of ["a", "b"]) state[one].stiffness = [3000, 3000, 3000, 100, 100, 100]; }, true)""")
+        for (const one of ["a", "b"]) state[one].stiffness = [3000, 3000, 3000, 100, 100, 100]; state.b.damping = {ratio: 0.7}; }, true)""")
     page.until(CURRENT)
 
 
