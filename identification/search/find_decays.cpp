@@ -25,7 +25,7 @@ constexpr double kStandstill = 1;  // within a motion
 constexpr double kEnvelope = 1.5;  // window
 // Times over which positions are compared, of which the first that shows a push counts: over short
 // ones fast motion shows, over long ones slow motion stands out of more noise.
-constexpr std::array kLags = {0.025, 0.1, 0.4};
+constexpr std::array kLags = {0.025, 0.1, 0.4, 1.6};
 constexpr Index kLeast = 20;  // samples of a decay
 
 /// How fast the channels move: root mean square of differences over `lag`, in units of their noise.

@@ -94,6 +94,51 @@ TEST(IdentifyDecays, TakesRecordsTogetherAndANoisyOneForLess) {
   }
 }
 
+/// A single record does not show what is not linear in it; two do.
+TEST(IdentifyDecays, IsLessSureOfOneRecordThanItsLikelihood) {
+  const KnownDecay decay;
+  Dice draw(15);
+  const MotionRecord one = decay.record(1e-5, 0, draw);
+  const double alone = identify_decays({one}).modes[0].natural_frequency_std,
+               both = identify_decays({one, one}).modes[0].natural_frequency_std;
+  EXPECT_GT(alone / both, 1.3 * std::sqrt(2));
+}
+
+/// A hundredth of the samples is off by far: more is left over than the others' noise.
+TEST(IdentifyDecays, IsLessSureWhereMoreIsLeftOverThanTheSensorsNoise) {
+  const KnownDecay decay;
+  Dice draw(16);
+  const MotionRecord good = decay.record(1e-5, 0, draw);
+  MotionRecord bad = good;
+  for (Eigen::Index i = 50; i < bad.output.cols(); i += 100) {
+    bad.output.col(i) += 5e-4 * VectorXd{{draw.normal(), draw.normal()}};
+  }
+  const Identification clean = identify_decays({good, good}), off = identify_decays({bad, bad});
+  const double left = (off.noise.array() / clean.noise.array()).maxCoeff();
+  EXPECT_GT(left, 3);
+  EXPECT_GT(off.modes[0].natural_frequency_std / clean.modes[0].natural_frequency_std,
+            0.8 * std::pow(left, 1.5));
+}
+
+/// Twelve bits of an encoder's turn: a motion of some steps shows its lightly damped modes.
+TEST(IdentifyDecays, FindsModesInAFewStepsOfAnEncoder) {
+  constexpr double kStep = 2 * std::numbers::pi / 4096;
+  const KnownDecay decay;
+  Dice draw(17);
+  MotionRecord record = decay.record(0, 0, draw);
+  record.output.colwise() -= VectorXd(record.output.rightCols(1));
+  record.output *= 15 * kStep / record.output.cwiseAbs().maxCoeff();
+  record.output = kStep * (record.output / kStep).array().round();
+  const std::vector<FreeDecay> parts = find_decays(record);
+  ASSERT_FALSE(parts.empty());
+  EXPECT_EQ(parts[0].reason, "");
+  const Identification found = identify_decays({record});
+  ASSERT_GE(found.modes.size(), 1u);
+  EXPECT_NEAR(found.modes[0].natural_frequency, decay.w1,
+              3.5 * found.modes[0].natural_frequency_std);
+  EXPECT_LT(found.modes[0].natural_frequency_std, 0.02 * decay.w1);
+}
+
 TEST(DecayScales, AreFoundOfEachRecordBesideTheStrongest) {
   constexpr double w = 9, z = 0.12;
   const std::vector<std::array<double, 2>> scale{{0.5, 0}, {1, 0}, {0.25, 0.3}};  // of x, x' / w
