@@ -1,5 +1,6 @@
 // Run time against error of spectra: spectrum_error/DAMPING_SCALING/METHOD/m for m modes. `error`
-// is the largest relative one of an eigenvalue against 33 digits, `bound` what we prove of it.
+// is the largest relative one of an eigenvalue against those that FLINT/Arb proves, `bound` what we
+// prove of it.
 //   ours_direct, ours_tracked (from a system that differs by 1e-4), ours_values (the same without
 //     shapes), ours_reused (the same system again): {M, C, K} to modes, with proved bounds
 //   ours_working, ours_extended: directly, with residuals in working precision or in twice that
@@ -14,7 +15,7 @@
 #ifdef DASHPOT_HAVE_ARB
 #include <dashpot/tests/support/certified_spectrum.hpp>
 #endif
-#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/proved_eigenvalues.hpp>
 
 #include <benchmark/benchmark.h>
 #include <lapacke.h>
@@ -29,9 +30,7 @@
 namespace {
 
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
-using dashpot::testing::Quad;
-using dashpot::testing::QuadComplex;
-using dashpot::testing::to_quad;
+using dashpot::testing::LongComplex;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Values = std::vector<std::complex<double>>;
@@ -93,25 +92,21 @@ MatrixXd state_matrix(const System<>& system) {
 /// A system, and its eigenvalues.
 struct Problem {
   System<> system;
-  std::vector<QuadComplex> truth;
+  std::vector<LongComplex> truth;
 };
 
-std::vector<QuadComplex> truth_of(const System<>& system) {
-  SpectrumSolver<> solver;
-  Spectrum<> spectrum;
-  solver.solve(system, spectrum);
-  std::vector<QuadComplex> start;
-  for (const Mode<>& mode : spectrum.modes) {
-    for (const Complex& value : mode.eigenvalues) start.push_back(to_quad(value));
-  }
-  for (std::size_t i = 0; i < start.size(); ++i) {  // no two may be the same
-    start[i].re *= static_cast<Quad>(1 + 1e-10 * static_cast<double>(i + 1));
-  }
-  return dashpot::testing::refine_eigenvalues(system, start);
-}
-
+/// Counts the largest relative error, each value matched with the nearest true one that is left.
 void report(benchmark::State& state, const Problem& problem, const Values& found) {
-  state.counters["error"] = dashpot::testing::largest_error(problem.truth, found);
+  std::vector<LongComplex> left = problem.truth;
+  double largest = found.size() == left.size() ? 0 : 1;
+  for (const std::complex<double>& value : found) {
+    if (left.empty()) break;
+    const auto nearest = dashpot::testing::nearest_to(value, left);
+    const auto error = std::abs(*nearest - LongComplex(value)) / std::abs(*nearest);
+    largest = std::max(largest, static_cast<double>(error));
+    left.erase(nearest);
+  }
+  state.counters["error"] = largest;
 }
 
 template <int N>
@@ -274,7 +269,7 @@ void add_problem(const Family& family, int m) {
     benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
       if (problem->truth.empty()) {
         problem->system = make_system(family, m);
-        problem->truth = truth_of(problem->system);
+        problem->truth = dashpot::testing::proved_eigenvalues(problem->system);
       }
       function(state, *problem);
     })->Unit(benchmark::kMicrosecond);

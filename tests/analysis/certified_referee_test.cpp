@@ -5,6 +5,7 @@
 #include <dashpot/analysis/tracker/tracked_start.hpp>
 #include <dashpot/tests/support/arm_path.hpp>
 #include <dashpot/tests/support/certified_spectrum.hpp>
+#include <dashpot/tests/support/enclosure.hpp>
 #include <dashpot/tests/support/made_to_measure.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/support/tracker_paths.hpp>
@@ -33,7 +34,6 @@ using testing::CertifiedEigenvalues;
 using testing::Dice;
 using testing::PathFamily;
 using testing::SystemPath;
-using Disc = testing::Point<long double>;
 
 /// 1 to 10, small ones more often.
 int any_size(Dice& dice) {
@@ -149,7 +149,7 @@ std::vector<PathFamily> families() {
 
 /// What was published: discs of eigenvalues, and how many eigenvalues it does not speak of.
 struct Published {
-  std::vector<Disc> center;
+  std::vector<testing::LongComplex> center;
   std::vector<long double> radius;
   int unproved = 0;  ///< eigenvalues without a finite radius
 
@@ -158,9 +158,8 @@ struct Published {
       ++unproved;
       return;
     }
-    const auto wide = [](double x) { return static_cast<long double>(x); };
-    center.push_back({wide(value.real()), wide(value.imag())});
-    radius.push_back(wide(bound));
+    center.emplace_back(value);
+    radius.push_back(static_cast<long double>(bound));
   }
   int claimed() const { return static_cast<int>(center.size()) + unproved; }
 };
@@ -192,7 +191,7 @@ long double wanted_radius(const std::vector<const Published*>& all) {
   long double least = std::numeric_limits<long double>::infinity();
   for (const Published* each : all) {
     for (std::size_t i = 0; i < each->center.size(); ++i) {
-      const long double size = distance(each->center[i], Disc{});
+      const long double size = std::abs(each->center[i]);
       const long double radius = std::max(each->radius[i], 1e-25L * size);
       if (radius > 0) least = std::min(least, radius);
     }
@@ -207,8 +206,7 @@ void expect_met(const Published& ours, Status status, const CertifiedEigenvalues
   ASSERT_TRUE(status == Status::kOk || status == Status::kUncertified) << to_text(status);
   EXPECT_LE(ours.claimed(), expected);
   EXPECT_TRUE(status == Status::kUncertified || (ours.claimed() == expected && ours.unproved == 0));
-  const testing::Matching<long double> matching(ours.center, truth.center, ours.radius,
-                                                truth.slack());
+  const testing::Matching matching(ours.center, truth.center, ours.radius, truth.slack());
   EXPECT_TRUE(matching.complete()) << "some disc meets no ball of its own";
 }
 
@@ -278,7 +276,7 @@ TEST_P(CertifiedReferee, EveryDiscMeetsABallOfItsOwn) {
       }
       if (HasFailure()) return;
       long double size = 0;
-      for (const Disc& z : truth.center) size = std::max(size, distance(z, Disc{}));
+      for (const auto& z : truth.center) size = std::max(size, std::abs(z));
       for (const Published* each : {&of_direct, &of_tracked}) {
         for (const long double radius : each->radius) {
           radii.push_back(static_cast<double>(radius / size));

@@ -236,10 +236,7 @@ Enclosed expect_enclosed(const System<>& system, bool extended, Spectrum<>& spec
   const std::vector<LongComplex> truth = true_eigenvalues(system);
   for (const Mode<>& mode : spectrum.modes) {
     const LongComplex value(mode.eigenvalues[0]);
-    const LongComplex nearest = *std::min_element(
-        truth.begin(), truth.end(), [&](const LongComplex& a, const LongComplex& b) {
-          return std::abs(a - value) < std::abs(b - value);
-        });
+    const LongComplex nearest = *testing::nearest_to(value, truth);
     const Long error = std::abs(nearest - value);
     EXPECT_LE(error, static_cast<Long>(mode.error_bound)) << "at " << mode.eigenvalues[0];
     seen.widest = std::max(seen.widest, mode.error_bound);

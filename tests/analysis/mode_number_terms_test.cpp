@@ -138,9 +138,7 @@ TEST(ModeNumberTerms, RoundingErrorsOfEigenvaluesOfABlock) {
     const std::vector<LongComplex> truth = testing::true_eigenvalues(system);
     for (const Mode<>& mode : spectrum.modes) {
       for (const Complex& value : mode.eigenvalues) {
-        long double error = std::numeric_limits<long double>::infinity();
-        for (const LongComplex& z : truth)
-          error = std::min(error, std::abs(z - LongComplex(value)));
+        const long double error = testing::distance_to_nearest(value, truth);
         EXPECT_LE(error, mode.error_bound) << "trial " << trial;
         double& worst = largest[n == 1 ? 0 : 1];
         worst = std::max(worst, static_cast<double>(error) / mode.error_bound);

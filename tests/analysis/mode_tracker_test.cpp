@@ -3,7 +3,6 @@
 #include <dashpot/tests/support/panda_path.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/tracked.hpp>
-#include <dashpot/tests/support/true_spectrum.hpp>
 
 #include <gtest/gtest.h>
 

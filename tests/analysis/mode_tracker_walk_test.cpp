@@ -103,11 +103,11 @@ TEST(Enclosure, FindsBoundsThatAreTooSmall) {
   testing::Tracked tracked;
   ASSERT_EQ(tracked.update(system), Status::kOk);
   const TrackedSpectrum good = *tracked.spectrum;
-  EXPECT_TRUE(testing::judge<long double>(system, good, 0).enclosed);
+  EXPECT_TRUE(testing::judge(system, good, 0).enclosed);
   const auto broken = [&](const auto& change) {
     const auto bad = std::make_unique<TrackedSpectrum>(good);
     change(bad->modes[0]);
-    return !testing::judge<long double>(system, *bad, 0).enclosed;
+    return !testing::judge(system, *bad, 0).enclosed;
   };
   EXPECT_TRUE(broken([](ModeNumbers& mode) { mode.eigenvalues[0] += 1e-10; }));
   EXPECT_TRUE(broken([](ModeNumbers& mode) { mode.natural_frequency += 1e-10; }));

@@ -1,7 +1,7 @@
 // Many modes near critical damping at one frequency: how impedance controllers are often tuned, and
 // the hardest clusters of eigenvalues there are, since each mode is nearly defective by itself.
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/proved_eigenvalues.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 #include <dashpot/tests/support/tracked.hpp>
@@ -31,6 +31,7 @@ System<> cluster(Eigen::Index n, double coupling, testing::Random& random) {
 
 /// Its modes are a root of the coupling apart, far more than the bounds, unless it is next to none.
 TEST(NearCriticalCluster, IsSolvedAndBoundedHoweverWeaklyItsModesAreCoupled) {
+  DASHPOT_NEEDS_PROVED_EIGENVALUES();
   testing::Random random(7001);
   for (const double coupling : {1e-12, 1e-11, 1e-10, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3, 1e-2}) {
     for (Eigen::Index n = 2; n <= 7; ++n) {
@@ -39,26 +40,19 @@ TEST(NearCriticalCluster, IsSolvedAndBoundedHoweverWeaklyItsModesAreCoupled) {
         const System<> system = cluster(n, coupling, random);
         const Spectrum<> spectrum = analyze(system);
         ASSERT_EQ(spectrum.modes.size(), n);
-        std::vector<testing::QuadComplex> truth;
         for (const Mode<>& mode : spectrum.modes) {
           EXPECT_LT(mode.backward_error, 1e-11);
           for (const Complex& value : mode.eigenvalues) {
             EXPECT_LT(modulus(value + 1.0), 10 * std::sqrt(coupling) + 1e-5);
-            const double step = 1e-12 * static_cast<double>(truth.size() + 1);
-            truth.push_back(testing::to_quad(value + Complex(step, 0.7 * step)));
           }
         }
         if (repeat > 0 || coupling < 1e-11 || coupling > 1e-3) continue;
-        truth = testing::refine_eigenvalues(system, truth);
+        const auto truth = testing::proved_eigenvalues(system);
         for (const Mode<>& mode : spectrum.modes) {
           EXPECT_LT(mode.error_bound, 0.03 * std::sqrt(coupling));
           EXPECT_NE(mode.kind, ModeKind::kCritical);
           for (const Complex& value : mode.eigenvalues) {
-            testing::Quad nearest = 1;
-            for (const testing::QuadComplex& true_one : truth) {
-              nearest = std::min(nearest, (true_one - testing::to_quad(value)).norm());
-            }
-            EXPECT_LE(std::sqrt(static_cast<double>(nearest)), mode.error_bound);
+            EXPECT_LE(testing::distance_to_nearest(value, truth), mode.error_bound);
           }
         }
       }

@@ -1,6 +1,6 @@
 // Damping of the null space, against 33 digits.
 #include <dashpot/analysis/null_damping.hpp>
-#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/quad_matrix.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
@@ -15,12 +15,11 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::Quad;
 using testing::quad_matrix;
-using testing::QuadComplex;
 using testing::QuadMatrix;
 using testing::Random;
 
 QuadMatrix transposed(const QuadMatrix& A) {
-  QuadMatrix T(A[0].size(), std::vector<QuadComplex>(A.size()));
+  QuadMatrix T(A[0].size(), std::vector<Quad>(A.size()));
   for (std::size_t i = 0; i < A.size(); ++i) {
     for (std::size_t j = 0; j < A[0].size(); ++j) T[j][i] = A[i][j];
   }
@@ -40,7 +39,7 @@ QuadMatrix exact_null_space_damping(const MatrixXd& M, const MatrixXd& J, const 
   const QuadMatrix held = MJ * inverse(quad_matrix(J) * MJ) * quad_matrix(J);
   QuadMatrix N = quad_matrix(MatrixXd::Identity(M.rows(), M.rows()));
   for (std::size_t i = 0; i < N.size(); ++i) {
-    for (std::size_t j = 0; j < N.size(); ++j) N[i][j] = N[i][j] - held[i][j];
+    for (std::size_t j = 0; j < N.size(); ++j) N[i][j] -= held[i][j];
   }
   return transposed(N) * quad_matrix(D) * N;
 }
@@ -49,7 +48,7 @@ double worst_share(const QuadMatrix& exact, const NullSpaceDamping& found) {
   double worst = 0;
   for (Eigen::Index i = 0; i < found.damping.rows(); ++i) {
     for (Eigen::Index j = 0; j < found.damping.cols(); ++j) {
-      const Quad truth = exact[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)].re;
+      const Quad truth = exact[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
       const double error =
           std::abs(static_cast<double>(truth - static_cast<Quad>(found.damping(i, j))));
       if (error > 0) worst = std::max(worst, error / found.error(i, j));

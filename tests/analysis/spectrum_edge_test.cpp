@@ -1,7 +1,7 @@
 // Systems at the edges: empty ones, bad ones, ones that are not symmetric, coupled zero modes.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
-#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/proved_eigenvalues.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
@@ -15,6 +15,7 @@ namespace {
 
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
+using testing::distance_to_nearest;
 using testing::kInfinity;
 using testing::kNan;
 using testing::LongComplex;
@@ -42,9 +43,7 @@ void expect_proper_modes(const System<>& system, const Spectrum<>& spectrum) {
   for (const Mode<>& mode : spectrum.modes) {
     for (std::size_t k = 0; k < 2; ++k) {
       const Complex lambda = mode.eigenvalues[k];
-      long double error = std::numeric_limits<long double>::infinity();
-      for (const LongComplex& z : truth) error = std::min(error, std::abs(z - LongComplex(lambda)));
-      EXPECT_LE(error, mode.error_bound) << lambda;
+      EXPECT_LE(distance_to_nearest(lambda, truth), mode.error_bound) << lambda;
       EXPECT_LE(mode.error_bound, 1e-9 * std::abs(lambda)) << lambda;
       const MatrixXcd Q =
           lambda * lambda * system.mass + lambda * system.damping + system.stiffness;
@@ -247,24 +246,19 @@ TEST(Spectrum, IsFoundBesideANearlyFreeJoint) {
   ASSERT_EQ(SpectrumSolver<>().solve(system, spectrum), Status::kOk);
   EXPECT_EQ(spectrum.zero_modes.count, 0);
   std::vector<LongComplex> truth = true_eigenvalues(system);
-  const auto nearest = [&](LongComplex value) {
-    return std::min_element(truth.begin(), truth.end(), [&](LongComplex a, LongComplex b) {
-      return std::abs(a - value) < std::abs(b - value);
-    });
-  };
-  *nearest(0.0L) = static_cast<long double>(-K[5] / D(5, 5));  // too slow for the truth's digits
+  *testing::nearest_to(0, truth) =
+      static_cast<long double>(-K[5] / D(5, 5));  // too slow for the truth's digits
   for (const Mode<>& mode : spectrum.modes) {
     for (std::size_t k = 0; k < 2; ++k) {
-      const LongComplex value = mode.eigenvalues[k];
-      EXPECT_LE(std::abs(*nearest(value) - value),
-                static_cast<long double>(mode.eigenvalue_bounds[k]))
-          << value;
+      const Complex value = mode.eigenvalues[k];
+      EXPECT_LE(distance_to_nearest(value, truth), mode.eigenvalue_bounds[k]) << value;
       EXPECT_LE(mode.eigenvalue_bounds[k], 1e-12 * D.norm()) << value;
     }
   }
 }
 
 TEST(Spectrum, BoundsEachEigenvalueOfOverdampedModes) {
+  DASHPOT_NEEDS_PROVED_EIGENVALUES();
   Random random(4701);
   for (int trial = 0; trial < 120; ++trial) {
     const int n = random.integer(1, trial % 10 == 0 ? 14 : 6);
@@ -275,26 +269,14 @@ TEST(Spectrum, BoundsEachEigenvalueOfOverdampedModes) {
     const Spectrum<> spectrum = analyze(system);
     EXPECT_EQ(spectrum.status, Status::kOk);
     ASSERT_EQ(spectrum.modes.size(), n);
-    std::vector<testing::QuadComplex> truth;
+    const std::vector<LongComplex> truth = testing::proved_eigenvalues(system);
     for (const Mode<>& mode : spectrum.modes) {
       ASSERT_EQ(mode.kind, ModeKind::kOverdamped);
       EXPECT_EQ(mode.error_bound, std::max(mode.eigenvalue_bounds[0], mode.eigenvalue_bounds[1]));
       for (std::size_t k = 0; k < 2; ++k) {
         const Complex value = mode.eigenvalues[k];
         EXPECT_LE(mode.eigenvalue_bounds[k], 1e-9 * modulus(value)) << value;
-        const double step = 1e-9 * static_cast<double>(truth.size() + 1);
-        truth.push_back(testing::to_quad(value * Complex(1 + step, step)));
-      }
-    }
-    truth = testing::refine_eigenvalues(system, truth);
-    for (const Mode<>& mode : spectrum.modes) {
-      for (std::size_t k = 0; k < 2; ++k) {
-        double nearest = kInfinity;
-        for (const testing::QuadComplex& true_one : truth) {
-          const auto distance = (true_one - testing::to_quad(mode.eigenvalues[k])).norm();
-          nearest = std::min(nearest, std::sqrt(static_cast<double>(distance)));
-        }
-        EXPECT_LE(nearest, mode.eigenvalue_bounds[k]) << mode.eigenvalues[k];
+        EXPECT_LE(distance_to_nearest(value, truth), mode.eigenvalue_bounds[k]) << value;
       }
     }
   }

@@ -2,16 +2,11 @@
 // result.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/oracle.hpp>
+#include <dashpot/tests/support/proved_eigenvalues.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
-
-#if defined(DASHPOT_HAVE_ARB)
-#include <arb_fmpz_poly.h>
-#include <flint/fmpz_poly_factor.h>
-#include <flint/fmpz_poly_mat.h>
-#endif
 
 #include <algorithm>
 #include <cmath>
@@ -179,25 +174,6 @@ TEST_P(SpectrumOracle, EnclosesTheTruth) {
 }
 
 #if defined(DASHPOT_HAVE_ARB)
-/// det(l^2 M + l C + K) 2^k with whole numbers, exactly.
-void set_characteristic(const SpectrumCase& given, fmpz_poly_t polynomial) {
-  constexpr int kScale = 400;  // no entry has a bit of less than 2^-400
-  fmpz_poly_mat_t pencil;
-  fmpz_t entry;
-  fmpz_poly_mat_init(pencil, given.n, given.n), fmpz_init(entry);
-  for (int i = 0; i < given.n * given.n; ++i) {
-    slong power = 0;
-    for (const Eigen::MatrixXd* part : {&given.stiffness, &given.damping, &given.mass}) {
-      fmpz_set_d(entry, std::ldexp((*part)(i), kScale));
-      fmpz_poly_set_coeff_fmpz(fmpz_poly_mat_entry(pencil, i % given.n, i / given.n), power++,
-                               entry);
-    }
-  }
-  fmpz_poly_mat_det(polynomial, pencil);
-  fmpz_poly_primitive_part(polynomial, polynomial);
-  fmpz_poly_mat_clear(pencil), fmpz_clear(entry);
-}
-
 /// Whether hi + lo is a part of a root to 31 digits, or both are zero.
 bool same_part(double hi, double lo, const arb_t part, double size) {
   constexpr slong kBits = 400;
@@ -218,31 +194,17 @@ bool same_part(double hi, double lo, const arb_t part, double size) {
 TEST_P(SpectrumOracle, IsWhatArbProves) {
   DASHPOT_SKIP_IF_QUICK();
 #if defined(DASHPOT_HAVE_ARB)
-  constexpr slong kBits = 300;
   std::vector<ReferenceEigenvalue> left = reference.eigenvalues;
-  fmpz_poly_t polynomial;
-  fmpz_poly_factor_t factors;
-  fmpz_poly_init(polynomial), fmpz_poly_factor_init(factors);
-  set_characteristic(reference, polynomial);
-  fmpz_poly_factor_squarefree(factors, polynomial);
-  for (slong i = 0; i < factors->num; ++i) {
-    const slong count = fmpz_poly_degree(factors->p + i);
-    const acb_ptr roots = _acb_vec_init(count);
-    arb_fmpz_poly_complex_roots(roots, factors->p + i, 0, kBits);
-    for (slong k = 0; k < count * factors->exp[i]; ++k) {
-      const acb_ptr root = roots + k % count;
-      const auto same = std::find_if(left.begin(), left.end(), [&](const ReferenceEigenvalue& z) {
-        const double size = std::hypot(z.re_hi, z.im_hi);
-        return same_part(z.re_hi, z.re_lo, acb_realref(root), size) &&
-               same_part(z.im_hi, z.im_lo, acb_imagref(root), size);
-      });
-      EXPECT_NE(same, left.end()) << arf_get_d(arb_midref(acb_realref(root)), ARF_RND_NEAR);
-      if (same != left.end()) left.erase(same);
-    }
-    _acb_vec_clear(roots, count);
-  }
+  testing::for_each_eigenvalue(system, 300, [&](const acb_t root) {
+    const auto same = std::find_if(left.begin(), left.end(), [&](const ReferenceEigenvalue& z) {
+      const double size = std::hypot(z.re_hi, z.im_hi);
+      return same_part(z.re_hi, z.re_lo, acb_realref(root), size) &&
+             same_part(z.im_hi, z.im_lo, acb_imagref(root), size);
+    });
+    EXPECT_NE(same, left.end()) << arf_get_d(arb_midref(acb_realref(root)), ARF_RND_NEAR);
+    if (same != left.end()) left.erase(same);
+  });
   for (const ReferenceEigenvalue& z : left) ADD_FAILURE() << z;
-  fmpz_poly_clear(polynomial), fmpz_poly_factor_clear(factors);
 #else
   GTEST_SKIP() << "FLINT/Arb is not installed (libflint-arb-dev, libflint-dev)";
 #endif

@@ -1,6 +1,6 @@
 // What `dashpot analyze` rounds when it forms the coefficients of a file is in the bounds.
 #include <dashpot/tests/apps/json_result.hpp>
-#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/quad_matrix.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <cmath>

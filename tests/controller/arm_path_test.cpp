@@ -20,7 +20,7 @@ void lead(const Arm& arm, const GainScales& scales) {
       was_soft |= mode.kind == analysis::ModeKind::kSoft;
     }
     if (tick % 30 != 0) continue;
-    const Verdict verdict = judge<long double>(watched->system(), watched->spectrum(), 0);
+    const Verdict verdict = judge(watched->system(), watched->spectrum(), 0);
     ASSERT_TRUE(verdict.enclosed) << "tick " << tick << ": " << verdict.what;
   }
   EXPECT_TRUE(was_soft ||

@@ -1,7 +1,7 @@
 // Modes from within the tick: right, with proved bounds, each with its number.
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
-#include <dashpot/tests/support/true_spectrum.hpp>
+#include <dashpot/tests/support/tracked.hpp>
 
 #include <gtest/gtest.h>
 
@@ -23,19 +23,6 @@ using testing::LongMatrix;
 using testing::panda_model;
 using testing::unlimited_settings;
 
-/// Eigenvalues of M q'' + C q' + K q = 0, by a solver of their own in long double.
-std::vector<LongComplex> eigenvalues_of(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
-                                        const Eigen::MatrixXd& K) {
-  const Eigen::Index n = M.rows();
-  LongMatrix A = LongMatrix::Zero(2 * n, 2 * n);
-  const auto inverse = LongMatrix(M.cast<long double>()).inverse().eval();
-  A.topRightCorner(n, n).setIdentity();
-  A.bottomLeftCorner(n, n) = -inverse * K.cast<long double>();
-  A.bottomRightCorner(n, n) = -inverse * C.cast<long double>();
-  const auto values = Eigen::EigenSolver<LongMatrix>(A, false).eigenvalues().eval();
-  return {values.begin(), values.end()};
-}
-
 /// At joint position q, with the textbook's null-space projector: away from singularities.
 std::vector<LongComplex> textbook_eigenvalues(const RobotModel& model, const Settings& settings,
                                               const JointVector& q) {
@@ -53,14 +40,15 @@ std::vector<LongComplex> textbook_eigenvalues(const RobotModel& model, const Set
   }
   const Eigen::VectorXd friction = model.joint_values(&Joint::viscous_friction);
   C += friction.asDiagonal();
-  return eigenvalues_of(M, C, K);
+  return testing::true_eigenvalues(testing::system_from(M, C, K));
 }
 
 /// Returns the eigenvalues of the closed loop as the law's matrices give it.
 std::vector<LongComplex> eigenvalues_now(const Controller& controller) {
   analysis::System<kMaxJoints> system;
   controller.closed_loop(system);
-  return eigenvalues_of(system.mass, system.damping, system.stiffness);
+  return testing::true_eigenvalues(
+      testing::system_from(system.mass, system.damping, system.stiffness));
 }
 
 /// Each published eigenvalue is one of `truth`, one to one. Returns the largest relative error;
@@ -72,10 +60,7 @@ double worst_error(const Vibration& modes, std::vector<LongComplex> truth) {
   for (int i = 0; i < modes.count; ++i) {
     for (const analysis::Complex& value : modes.modes[at(i)].eigenvalues) {
       const LongComplex computed(value);
-      const auto nearest = std::min_element(
-          truth.begin(), truth.end(), [&](const LongComplex& a, const LongComplex& b) {
-            return std::abs(a - computed) < std::abs(b - computed);
-          });
+      const auto nearest = testing::nearest_to(computed, truth);
       const auto size = std::abs(computed) + 1e-6L * largest;
       worst = std::max(worst, static_cast<double>(std::abs(*nearest - computed) / size));
       truth.erase(nearest);

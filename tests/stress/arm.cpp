@@ -29,7 +29,7 @@ bool lead(const Arm& arm, const GainScales& scales, long ticks) {
   for (long tick = 0; tick <= ticks; ++tick) {
     watched->step(static_cast<double>(tick) / static_cast<double>(ticks));
     if (tick % 20 != 0) continue;
-    const Verdict verdict = judge<long double>(watched->system(), watched->spectrum(), 0);
+    const Verdict verdict = judge(watched->system(), watched->spectrum(), 0);
     all.enclosed = all.enclosed && verdict.enclosed;
     all.tightest = std::max(all.tightest, verdict.tightest);
     all.widest = std::max(all.widest, verdict.widest);

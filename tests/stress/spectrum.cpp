@@ -1,11 +1,12 @@
 // Sweeps the conditioning of systems until the spectrum, solved or tracked from a system nearby,
 // breaks, and says where and how it says so. Every eigenvalue with a finite bound has
-// to lie within it of a true one (33 digits). What cannot be proved has to be said: by an infinite
-// bound, or by a status.
+// to lie within it of one that FLINT/Arb proves. What cannot be proved has to be said: by an
+// infinite bound, or by a status.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/stress/part.hpp>
-#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/enclosure.hpp>
+#include <dashpot/tests/support/proved_eigenvalues.hpp>
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
@@ -14,19 +15,15 @@
 #include <cstdint>
 #include <cstdio>
 #include <functional>
-#include <map>
 #include <memory>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 
 namespace {
 
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
-using dashpot::testing::Quad;
-using dashpot::testing::QuadComplex;
-using dashpot::testing::to_quad;
+using dashpot::testing::LongComplex;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -94,66 +91,21 @@ struct Judgement {
   int zero_modes = 0;
 };
 
-std::vector<QuadComplex> truth_of(const System<>& system, const Spectrum<>& spectrum) {
-  std::vector<QuadComplex> start;
-  for (const Mode<>& mode : spectrum.modes) {
-    for (const Complex& value : mode.eigenvalues) start.push_back(to_quad(value));
-  }
-  const double size = start.empty() ? 1
-                                    : std::hypot(static_cast<double>(start.back().re),
-                                                 static_cast<double>(start.back().im));
-  while (start.size() < 2 * kModes) {  // those of zero modes
-    start.push_back(to_quad({-1e-9 * size * static_cast<double>(start.size()), 1e-10 * size}));
-  }
-  for (std::size_t i = 0; i < start.size(); ++i) {
-    start[i].re *= static_cast<Quad>(1 + 1e-10 * static_cast<double>(i + 1));
-  }
-  return dashpot::testing::refine_eigenvalues(system, start);
-}
-
-/// Gives each of the first a partner of its own among those near it (their indices), by augmenting
-/// paths.
-bool have_partners(const std::vector<std::vector<std::size_t>>& near) {
-  std::map<std::size_t, std::size_t> owner;
-  std::set<std::size_t> visited;
-  const std::function<bool(std::size_t)> place = [&](std::size_t i) {
-    for (const std::size_t k : near[i]) {
-      if (!visited.insert(k).second) continue;
-      const auto taken = owner.find(k);
-      if (taken != owner.end() && !place(taken->second)) continue;
-      owner[k] = i;
-      return true;
-    }
-    return false;
-  };
-  for (std::size_t i = 0; i < near.size(); ++i) {
-    visited.clear();
-    if (!place(i)) return false;
-  }
-  return true;
-}
-
 /// Modes of any kind, from `begin` to `end`.
 template <typename Iterator>
 Verdict judge_modes(Iterator begin, Iterator end, Status status,
-                    const std::vector<QuadComplex>& truth) {
+                    const std::vector<LongComplex>& truth) {
   bool all = true;
-  std::vector<std::vector<std::size_t>> near;
+  std::vector<LongComplex> values;
+  std::vector<long double> bounds;
   for (Iterator mode = begin; mode != end; ++mode) {
-    if (!std::isfinite(mode->error_bound)) {
-      all = false;
-      continue;
-    }
-    const auto bound = static_cast<Quad>(mode->error_bound);
-    for (const Complex& value : mode->eigenvalues) {
-      near.emplace_back();
-      for (std::size_t k = 0; k < truth.size(); ++k) {
-        const Quad apart = (truth[k] - to_quad(value)).norm();
-        if (apart <= bound * bound) near.back().push_back(k);
-      }
-    }
+    all = all && std::isfinite(mode->error_bound);
+    if (!std::isfinite(mode->error_bound)) continue;
+    values.insert(values.end(), mode->eigenvalues.begin(), mode->eigenvalues.end());
+    bounds.resize(values.size(), static_cast<long double>(mode->error_bound));
   }
-  if (!have_partners(near) || (!all && status == Status::kOk)) return Verdict::kWrong;
+  const bool enclosed = dashpot::testing::Matching(values, truth, bounds).complete();
+  if (!enclosed || (!all && status == Status::kOk)) return Verdict::kWrong;
   return status == Status::kUncertified ? Verdict::kUnproved : Verdict::kProved;
 }
 
@@ -176,7 +128,7 @@ Judgements judge(const System<>& system, dashpot::analysis::ModeTracker& tracker
     return result;
   }
   result.direct.zero_modes = kModes - spectrum.modes.size();
-  const std::vector<QuadComplex> truth = truth_of(system, spectrum);
+  const auto truth = dashpot::testing::proved_eigenvalues(system);
   result.direct.verdict =
       judge_modes(spectrum.modes.begin(), spectrum.modes.end(), result.direct.status, truth);
 

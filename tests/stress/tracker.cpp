@@ -1,12 +1,10 @@
 // Follows the modes along random paths of every family of tests/support/tracker_paths.hpp, and
 // checks every published bound against eigenvalues in long double; what comes near its bound, and
-// every hundredth step besides, against 50 digits.
+// every hundredth step besides, against those that FLINT/Arb proves.
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/paths.hpp>
 #include <dashpot/tests/support/enclosure.hpp>
-
-#include <boost/multiprecision/cpp_bin_float.hpp>
-#include <boost/multiprecision/eigen.hpp>
+#include <dashpot/tests/support/proved_eigenvalues.hpp>
 
 #include <cstdio>
 #include <memory>
@@ -16,14 +14,13 @@ namespace {
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
 using dashpot::stress::kStepsOfAPath;
 using dashpot::testing::judge;
+using dashpot::testing::judge_against;
 using dashpot::testing::PathFamily;
+using dashpot::testing::proved_eigenvalues;
 using dashpot::testing::SystemPath;
 using dashpot::testing::Verdict;
 
-using Real50 = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<50>,
-                                             boost::multiprecision::et_off>;
-
-constexpr long kApart = 100;  ///< of the checks with 50 digits
+constexpr long kApart = 100;  ///< of the checks by Arb
 
 struct Tally {
   long steps = 0, precise = 0, unproved = 0, outside = 0;
@@ -61,9 +58,9 @@ void follow(const PathFamily& family, const SystemPath& path, std::uint64_t seed
     ++tally.steps;
     const Status status = tracker->update(system, *spectrum);
     if (status != Status::kOk && status != Status::kUncertified) continue;  // counted as failed
-    Verdict verdict = judge<long double>(system, *spectrum, 0);
+    Verdict verdict = judge(system, *spectrum, 0);
     if (!verdict.enclosed || verdict.tightest > 0.5 || tally.steps % kApart == 0) {
-      verdict = judge<Real50>(system, *spectrum, 0);
+      verdict = judge_against(proved_eigenvalues(system), *spectrum, 0);
       ++tally.precise;
     }
     if (verdict.proved) {
@@ -99,7 +96,7 @@ void print(const std::string& name, const Tally& t) {
 
 bool follow_all(const dashpot::stress::Request& request) {
   const long each = dashpot::stress::steps_of_each(request.whole());
-  std::printf("Seed %lu. `digits`: steps judged with 50 digits; the rest in long double.\n",
+  std::printf("Seed %lu. `digits`: steps judged by FLINT/Arb; the rest in long double.\n",
               request.seed);
   std::printf("%-17s %7s %6s %7s %6s %6s %6s | %5s | %8s %8s\n", "family", "steps", "digits",
               "tracked", "reused", "direct", "failed", "pass", "err/bnd", "widest");

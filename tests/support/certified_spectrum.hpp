@@ -2,10 +2,11 @@
 // Eigenvalues of (l^2 M + l C + K) u = 0 in balls that FLINT/Arb proves to hold them: an enclosure
 // by another library, another algorithm and another arithmetic than ours.
 #include <dashpot/analysis/system.hpp>
-#include <dashpot/tests/support/enclosure.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <acb_mat.h>
 
+#include <algorithm>
 #include <limits>
 #include <vector>
 
@@ -33,7 +34,7 @@ class BallMatrix {
 
 /// Eigenvalue i lies within radius[i] of a number that rounds to center[i], one to one.
 struct CertifiedEigenvalues {
-  std::vector<Point<long double>> center;
+  std::vector<LongComplex> center;
   std::vector<long double> radius;
   int bits = 0;  ///< of the arithmetic; 0: nothing could be proved
 
@@ -41,7 +42,7 @@ struct CertifiedEigenvalues {
   std::vector<long double> slack() const {
     std::vector<long double> all = radius;
     for (std::size_t i = 0; i < all.size(); ++i) {
-      all[i] += std::numeric_limits<long double>::epsilon() * distance(center[i], {});
+      all[i] += std::numeric_limits<long double>::epsilon() * std::abs(center[i]);
     }
     return all;
   }
@@ -70,6 +71,21 @@ void set_state_matrix(const analysis::System<N>& system, slong bits, BallMatrix&
   }
 }
 
+/// The centre of a ball, rounded to long double, real and imaginary part each by itself.
+inline LongComplex rounded(const acb_t ball) {
+  arf_t low;
+  arf_init(low);
+  const auto part = [&](const arb_t given) {
+    const double high = arf_get_d(arb_midref(given), ARF_RND_NEAR);
+    arf_set_d(low, high);
+    arf_sub(low, arb_midref(given), low, ARF_PREC_EXACT, ARF_RND_NEAR);
+    return static_cast<long double>(high) + static_cast<long double>(arf_get_d(low, ARF_RND_NEAR));
+  };
+  const LongComplex center(part(acb_realref(ball)), part(acb_imagref(ball)));
+  arf_clear(low);
+  return center;
+}
+
 /// Eigenvalues as arithmetic with `bits` encloses them. Those that it cannot tell apart share a
 /// ball, as often as there are eigenvalues in it.
 template <int N>
@@ -84,22 +100,14 @@ CertifiedEigenvalues certify_eigenvalues(const analysis::System<N>& system, int 
                                           vectors.get(), bits) != 0;
   if (!found) return result;
   result.bits = bits;
-  arf_t part;
-  arf_init(part);
-  const auto center_of = [&](const arb_t ball) {
-    const double high = arf_get_d(arb_midref(ball), ARF_RND_NEAR);
-    arf_set_d(part, high);
-    arf_sub(part, arb_midref(ball), part, ARF_PREC_EXACT, ARF_RND_NEAR);
-    return static_cast<long double>(high) + static_cast<long double>(arf_get_d(part, ARF_RND_NEAR));
-  };
+  arf_t radius;
+  arf_init(radius);
   for (Eigen::Index i = 0; i < size; ++i) {
-    const acb_ptr ball = proved.at(0, i);
-    const Point<long double> z{center_of(acb_realref(ball)), center_of(acb_imagref(ball))};
-    acb_get_rad_ubound_arf(part, ball, MAG_BITS);
-    result.center.push_back(z);
-    result.radius.push_back(static_cast<long double>(arf_get_d(part, ARF_RND_UP)));
+    result.center.push_back(rounded(proved.at(0, i)));
+    acb_get_rad_ubound_arf(radius, proved.at(0, i), MAG_BITS);
+    result.radius.push_back(static_cast<long double>(arf_get_d(radius, ARF_RND_UP)));
   }
-  arf_clear(part);
+  arf_clear(radius);
   return result;
 }
 

@@ -64,10 +64,6 @@ struct PlainMode {
 };
 using PlainModes = std::vector<PlainMode>;
 
-inline PlainModes plain_modes(const analysis::TrackedSpectrum& spectrum) {
-  return {spectrum.modes.begin(), spectrum.modes.begin() + spectrum.mode_count};
-}
-
 /// Fails unless the same places have the same bits.
 inline void compare_bits(const PlainModes& with, const PlainModes& without, SkipTally& tally) {
   if (with.size() != without.size()) return tally.fail();
@@ -87,18 +83,16 @@ inline void compare_bits(const PlainModes& with, const PlainModes& without, Skip
 
 /// The eigenvalues of modes, and the errors that they may have.
 struct PlainValues {
-  std::vector<Point<double>> points;
-  std::vector<double> reach;
+  std::vector<LongComplex> points;
+  std::vector<long double> reach;
   std::vector<std::size_t> mode;
 
   /// Bounds, and `relative` times the modulus.
   PlainValues(const PlainModes& modes, double relative) {
     for (std::size_t i = 0; i < modes.size(); ++i) {
       for (const analysis::Complex& value : modes[i].eigenvalues) {
-        points.push_back({value.real(), value.imag()});
-        reach.push_back(std::isfinite(modes[i].error_bound)
-                            ? modes[i].error_bound + relative * std::abs(value)
-                            : 1e300);
+        points.emplace_back(value);
+        reach.push_back(modes[i].error_bound + relative * std::abs(value));  // may be infinite
         mode.push_back(i);
       }
     }
@@ -107,9 +101,9 @@ struct PlainValues {
   int leave_out_strangers(const PlainValues& others) {
     PlainValues rest({}, 0);
     for (std::size_t k = 0; k < points.size(); ++k) {
-      bool near = points[k].y != 0;
+      bool near = points[k].imag() != 0;
       for (std::size_t j = 0; j < others.points.size() && !near; ++j) {
-        near = distance(points[k], others.points[j]) <= reach[k] + others.reach[j];
+        near = std::abs(points[k] - others.points[j]) <= reach[k] + others.reach[j];
       }
       if (!near) continue;
       rest.points.push_back(points[k]);
@@ -131,12 +125,13 @@ inline void compare_bounded(const PlainModes& with, const PlainModes& without, i
   PlainValues a(with, relative);
   const PlainValues b(without, 0);
   if (a.leave_out_strangers(b) > zero_modes) return tally.fail();
-  const Matching<double> matching(a.points, b.points, a.reach, b.reach);
+  const Matching matching(a.points, b.points, a.reach, b.reach);
   if (!matching.complete()) return tally.fail();
   std::vector<std::vector<std::size_t>> partners(with.size());
   for (std::size_t k = 0; k < a.points.size(); ++k) {
     const std::size_t other = matching.of(k);
-    tally.see(distance(a.points[k], b.points[other]), 0, a.reach[k] + b.reach[other]);
+    tally.see(static_cast<double>(std::abs(a.points[k] - b.points[other])), 0,
+              static_cast<double>(a.reach[k] + b.reach[other]));
     partners[a.mode[k]].push_back(b.mode[other]);
   }
   for (std::size_t i = 0; i < with.size(); ++i) {

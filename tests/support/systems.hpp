@@ -4,8 +4,8 @@
 #include <dashpot/analysis/system.hpp>
 #include <dashpot/tests/support/special_values.hpp>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <complex>
 #include <vector>
@@ -38,31 +38,69 @@ inline std::vector<LongComplex> eigenvalues_by_eigen(const LongMatrix& A) {
   return {values.begin(), values.end()};
 }
 
+/// Where the one of `all` is that is nearest to this.
+template <class Values>
+auto nearest_to(const LongComplex& value, Values& all) {
+  return std::min_element(all.begin(), all.end(), [&](const LongComplex& a, const LongComplex& b) {
+    return std::abs(a - value) < std::abs(b - value);
+  });
+}
+
+inline long double distance_to_nearest(const LongComplex& value,
+                                       const std::vector<LongComplex>& all) {
+  return all.empty() ? static_cast<long double>(kInfinity)
+                     : std::abs(*nearest_to(value, all) - value);
+}
+
 /// Largest distance when each computed eigenvalue takes the nearest true one that is left.
 inline double worst_distance(const std::vector<analysis::Complex>& computed,
                              std::vector<LongComplex> truth) {
   if (computed.size() != truth.size()) return kInfinity;
   long double worst = 0;
   for (const analysis::Complex& value : computed) {
-    const auto away = [&](const LongComplex& z) { return std::abs(z - LongComplex(value)); };
-    const auto nearest =
-        std::min_element(truth.begin(), truth.end(),
-                         [&](const auto& a, const auto& b) { return away(a) < away(b); });
-    worst = std::max(worst, away(*nearest));
+    const auto nearest = nearest_to(value, truth);
+    worst = std::max(worst, std::abs(*nearest - LongComplex(value)));
     truth.erase(nearest);
   }
   return static_cast<double>(worst);
 }
 
-/// Eigenvalues of [0 I; -M^-1 K  -M^-1 C] in long double.
-inline std::vector<LongComplex> true_eigenvalues(const analysis::System<>& system) {
+/// State matrix [0 J; -J' -D], with M = L L', D = L^-1 C L^-T and J = W L^-T (p x n). Without a
+/// factor W, J is the transposed Cholesky factor of L^-1 K L^-T. Where K has none, it is
+/// [0 I; -L^-1 K L^-T -D].
+template <int N>
+LongMatrix energy_state_matrix(const analysis::System<N>& system) {
+  const auto wide = [](const auto& A) { return LongMatrix(A.template cast<long double>()); };
   const Eigen::Index n = system.dof();
-  const auto lu = system.mass.cast<long double>().fullPivLu();
-  LongMatrix A(2 * n, 2 * n);
-  A << LongMatrix::Zero(n, n), LongMatrix::Identity(n, n),
-      -lu.solve(system.stiffness.cast<long double>()),
-      -lu.solve(system.damping.cast<long double>());
-  return eigenvalues_by_eigen(A);
+  const LongMatrix L = wide(system.mass).llt().matrixL();
+  const auto lower = L.triangularView<Eigen::Lower>();
+  const auto congruent = [&](const auto& A) {
+    const LongMatrix half = lower.solve(wide(A));
+    return LongMatrix(lower.solve(LongMatrix(half.transpose())).transpose());
+  };
+  LongMatrix J, minus_pull;
+  if (system.stiffness_factor.rows() > 0) {
+    J = lower.solve(LongMatrix(wide(system.stiffness_factor).transpose())).transpose();
+    minus_pull = J.transpose();
+  } else {
+    const LongMatrix K = congruent(system.stiffness);
+    const Eigen::LLT<LongMatrix> cholesky(K);
+    const bool definite =
+        system.stiffness == system.stiffness.transpose() && cholesky.info() == Eigen::Success;
+    J = definite ? LongMatrix(cholesky.matrixU()) : LongMatrix(LongMatrix::Identity(n, n));
+    minus_pull = definite ? LongMatrix(J.transpose()) : K;
+  }
+  const Eigen::Index p = J.rows();
+  LongMatrix A(p + n, p + n);
+  A << LongMatrix::Zero(p, p), J, -minus_pull, -congruent(system.damping);
+  return A;
+}
+
+/// Computed in long double: those of the modes, and the rates of zero modes, with their zeros where
+/// K has no factor.
+template <int N>
+std::vector<LongComplex> true_eigenvalues(const analysis::System<N>& system) {
+  return eigenvalues_by_eigen(energy_state_matrix(system));
 }
 
 }  // namespace dashpot::testing

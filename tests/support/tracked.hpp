@@ -1,8 +1,10 @@
 #pragma once
 // A tracker along a path, and whether what it publishes is true.
 
+#include <dashpot/tests/support/enclosure.hpp>
 #include <dashpot/tests/support/tracker_paths.hpp>
-#include <dashpot/tests/support/true_spectrum.hpp>
+
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <memory>
@@ -26,6 +28,15 @@ struct Tracked {
   std::unique_ptr<analysis::ModeTracker> tracker;
   std::unique_ptr<analysis::TrackedSpectrum> spectrum;
 };
+
+/// Expects each eigenvalue within its bound of a true one, one to one; and frequency and damping
+/// ratio within theirs, where the two true eigenvalues of the mode are clear.
+inline Verdict expect_enclosed(const analysis::System<analysis::kMaxDof>& system,
+                               const analysis::TrackedSpectrum& spectrum) {
+  const Verdict verdict = judge(system, spectrum, 1e-17);
+  EXPECT_TRUE(verdict.enclosed) << verdict.what << ", error / bound " << verdict.tightest;
+  return verdict;
+}
 
 /// |Q(lambda) u| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |u|)
 inline double backward_error(const analysis::System<analysis::kMaxDof>& system,
@@ -65,7 +76,7 @@ struct Follower : Tracked {
     }
   }
   virtual Verdict judge(const TrackedSystem& system) const {
-    return testing::judge<long double>(system, *spectrum, 1e-17);
+    return testing::judge(system, *spectrum, 1e-17);
   }
   /// At what else there is, at every step.
   virtual void look(const TrackedSystem& /*system*/) {}
