@@ -164,6 +164,43 @@ struct Case {
   friend void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 };
 
+/// Of the modes that springs and dampers of the tip make, without a load.
+const VectorXd kOmega{{12, 15, 19, 24, 30, 40}}, kZeta{{0.2, 0.5, 0.3, 0.6, 0.4, 0.25}};
+
+controller::Settings loaded_settings(const TwinModels& twin, const controller::Gains& gains,
+                                     Load load) {
+  controller::Settings settings = release_settings(twin, gains, 2.5e-4);
+  settings.task_terms.load = load;
+  settings.watchdog.feedback = 0;  // it stands still to the last bit
+  settings.limits.beyond_model = true;
+  settings.limits.torque.setConstant(1e4);
+  settings.limits.torque_rate.setConstant(1e6);
+  settings.motion.linear_velocity = settings.motion.angular_velocity = 1;
+  return settings;
+}
+
+World empty_world(Load load, Eigen::Index n) {
+  World world{load, Vector6::Zero(), {}, {}};
+  world.environment.joint_stiffness = world.environment.joint_damping = JointVector::Zero(n);
+  return world;
+}
+
+/// Scaled so that the tip gives way by a tenth of a metre, or of a radian, at most.
+Vector6 random_wrench(const controller::Matrix6& K_C, Random& random) {
+  Vector6 wrench;
+  wrench << random.vector(3), 0.1 * random.vector(3);
+  const Vector6 e = K_C.llt().solve(wrench);
+  return 0.1 / std::max(e.head<3>().norm(), e.tail<3>().norm()) * wrench;
+}
+
+/// The modes of three releases.
+testing::StateFit fit_of(LoadedArm& arm, double period, Eigen::Index n, int ticks, Random& random) {
+  std::vector<testing::Recording> recordings;
+  for (int k = 0; k < 3; ++k) recordings.push_back(arm.record(1e-7 * random.vector(n), ticks));
+  EXPECT_EQ(arm.worst, controller::Status::kOk) << to_text(arm.worst);
+  return testing::fit_states(recordings, period, arm.system.mass);
+}
+
 class LoadedModes : public ::testing::TestWithParam<Case> {};
 INSTANTIATE_TEST_SUITE_P(
     Loads, LoadedModes,
@@ -195,25 +232,16 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
     Random random(static_cast<std::uint64_t>(seed));
     const JointVector q0 = random_posture(twin, random);
     const auto robot = evaluate(twin.model, q0, JointVector::Zero(n));
-    const VectorXd omega{{12, 15, 19, 24, 30, 40}};
-    const VectorXd zeta{{0.2, 0.5, 0.3, 0.6, 0.4, 0.25}};
-    controller::Gains gains = tip_gains(twin, q0, omega, zeta, 0.3, random);
+    controller::Gains gains = tip_gains(twin, q0, kOmega, kZeta, 0.3, random);
     const controller::Matrix6 K_C = gains.task_stiffness;
     if (param.frame == controller::Frame::kTool) {
       gains.frame = param.frame;
       gains.task_stiffness = controller::turned(gains.task_stiffness, robot.R_BT.transpose());
       gains.task_damping = controller::turned(gains.task_damping, robot.R_BT.transpose());
     }
-    controller::Settings settings = release_settings(twin, gains, 2.5e-4);
+    controller::Settings settings = loaded_settings(twin, gains, param.load);
     settings.initial.mode = param.mode;
-    settings.task_terms.load = param.load;
-    settings.watchdog.feedback = 0;  // it stands still to the last bit
-    settings.limits.beyond_model = true;
-    settings.limits.torque.setConstant(1e4);
-    settings.limits.torque_rate.setConstant(1e6);
-    settings.motion.linear_velocity = settings.motion.angular_velocity = 1;
-    World world{param.load, Vector6::Zero(), {}, {}};
-    world.environment.joint_stiffness = world.environment.joint_damping = JointVector::Zero(n);
+    World world = empty_world(param.load, n);
     if (param.load == Load::kBaseWrench && param.environment) {
       const sim::Contact contact{gains.task_stiffness(2, 2), 0.1 * gains.task_damping(2, 2)};
       const Vector6 e = K_C.llt().solve(contact.stiffness * Vector6::Unit(2));
@@ -225,19 +253,16 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
       world.environment.tip_damping[2] = contact.damping;
       settings.environment = world.environment;
     } else if (param.load != Load::kIgnored) {
-      // A tenth of a metre, or of a radian, at most.
-      world.wrench << random.vector(3), 0.1 * random.vector(3);
-      const Vector6 e = K_C.llt().solve(world.wrench);
-      world.wrench *= 0.1 / std::max(e.head<3>().norm(), e.tail<3>().norm());
+      world.wrench = random_wrench(K_C, random);
       world.wrench *= std::min(1.0, 40 / world.wrench.head<3>().norm());
     }
     if (param.mode == Mode::kJoint) {
       const MatrixXd M = robot.M, L = M.llt().matrixL();
       const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(random.matrix(n, n)).householderQ();
       const MatrixXd F = L * Q;
-      settings.initial.gains.joint_stiffness = F * omega.cwiseAbs2().asDiagonal() * F.transpose();
+      settings.initial.gains.joint_stiffness = F * kOmega.cwiseAbs2().asDiagonal() * F.transpose();
       settings.initial.gains.joint_damping =
-          F * (2 * zeta.cwiseProduct(omega)).asDiagonal() * F.transpose();
+          F * (2 * kZeta.cwiseProduct(kOmega)).asDiagonal() * F.transpose();
     }
     if (param.load == Load::kIgnored) {
       world.environment.tip_stiffness = gains.task_stiffness.diagonal();
@@ -247,10 +272,7 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
       settings.environment = world.environment;
     }
     LoadedArm arm(twin, settings, q0, world);
-    std::vector<testing::Recording> recordings;
-    for (int k = 0; k < 3; ++k) recordings.push_back(arm.record(1e-7 * random.vector(n), 1600));
-    ASSERT_EQ(arm.worst, controller::Status::kOk) << to_text(arm.worst);
-    const auto fit = testing::fit_states(recordings, settings.period, arm.system.mass);
+    const testing::StateFit fit = fit_of(arm, settings.period, n, 1600, random);
     ASSERT_EQ(fit.modes.size(), 6u);
 
     analysis::SampledLoop loop;
@@ -303,37 +325,23 @@ TEST_P(LoadedPostures, HaveTheModesOfTheSimulatedMotion) {
     Random random(static_cast<std::uint64_t>(seed));
     const JointVector q0 = random_posture(twin, random);
     const auto robot = evaluate(twin.model, q0, JointVector::Zero(n));
-    const VectorXd omega{{12, 15, 19, 24, 30, 40}};
-    const VectorXd zeta{{0.2, 0.5, 0.3, 0.6, 0.4, 0.25}};
-    controller::Gains gains = tip_gains(twin, q0, omega, zeta, 0.3, random);
+    controller::Gains gains = tip_gains(twin, q0, kOmega, kZeta, 0.3, random);
     const VectorXd u = testing::self_motion(twin, q0);
     gains.null_stiffness = VectorXd(robot.M.diagonal());
     gains.null_stiffness *= 49 / u.dot(gains.null_stiffness.cwiseProduct(u));
     gains.null_damping = 0.08 * gains.null_stiffness;
-    controller::Settings settings = release_settings(twin, gains, 2.5e-4);
-    settings.task_terms.load = Load::kBaseWrench;
-    settings.watchdog.feedback = 0;
-    settings.limits.beyond_model = true;
-    settings.limits.torque.setConstant(1e4);
-    settings.limits.torque_rate.setConstant(1e6);
+    controller::Settings settings = loaded_settings(twin, gains, Load::kBaseWrench);
     settings.limits.gain_margin = 1;
-    settings.motion.linear_velocity = settings.motion.angular_velocity = 1;
     settings.motion.velocity.setConstant(2);
-    World world{Load::kBaseWrench, Vector6::Zero(), {}, {}};
-    world.environment.joint_stiffness = world.environment.joint_damping = JointVector::Zero(n);
-    world.wrench << random.vector(3), 0.1 * random.vector(3);
-    const Vector6 e = gains.task_stiffness.llt().solve(world.wrench);
-    world.wrench *= 0.1 / std::max(e.head<3>().norm(), e.tail<3>().norm());
+    World world = empty_world(Load::kBaseWrench, n);
+    world.wrench = random_wrench(gains.task_stiffness, random);
     world.posture_wrench = random.vector(6);
     const VectorXd p =
         (robot.J.transpose() * world.posture_wrench).cwiseQuotient(VectorXd(gains.null_stiffness));
     world.posture_wrench *= 0.4 / p.cwiseAbs().maxCoeff();
 
     LoadedArm arm(twin, settings, q0, world);
-    std::vector<testing::Recording> recordings;
-    for (int k = 0; k < 3; ++k) recordings.push_back(arm.record(1e-7 * random.vector(n), 4000));
-    ASSERT_EQ(arm.worst, controller::Status::kOk) << to_text(arm.worst);
-    const auto fit = testing::fit_states(recordings, settings.period, arm.system.mass);
+    const testing::StateFit fit = fit_of(arm, settings.period, n, 4000, random);
     ASSERT_EQ(fit.modes.size(), 7u);
     analysis::SampledLoop loop;
     loop.period = settings.period;

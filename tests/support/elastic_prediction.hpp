@@ -10,6 +10,8 @@
 
 #include <algorithm>
 #include <complex>
+#include <cstdio>
+#include <ostream>
 
 namespace dashpot::testing {
 
@@ -21,7 +23,41 @@ struct ElasticDifference {
   int modes = 0;         ///< compared
   bool bounded = false;  ///< there is a boundary
   bool stable = false;
+  bool link = false;  ///< measured there
   controller::Status status = controller::Status::kOk;
+
+  bool agrees() const {
+    return status == controller::Status::kOk && frequency < 1e-4 && ratio < 1e-3 && margin < 1e-3;
+  }
+};
+
+inline std::ostream& operator<<(std::ostream& out, const ElasticDifference& seen) {
+  return out << (seen.link ? "link" : "motor") << ", frequency off by " << seen.frequency
+             << ", ratio by " << seen.ratio << ", margin by " << seen.margin << "; "
+             << to_text(seen.status);
+}
+
+/// Those of several loops.
+struct ElasticDifferences {
+  ElasticDifference worst;
+  long loops = 0, bounded = 0, unstable = 0, links = 0;
+
+  void add(const ElasticDifference& seen) {
+    worst.frequency = std::max(worst.frequency, seen.frequency);
+    worst.ratio = std::max(worst.ratio, seen.ratio);
+    worst.margin = std::max(worst.margin, seen.margin);
+    worst.modes += seen.modes;
+    ++loops;
+    bounded += seen.bounded ? 1 : 0;
+    unstable += seen.stable ? 0 : 1;
+    links += seen.link ? 1 : 0;
+  }
+  void print() const {
+    std::printf(
+        "%d modes of %ld loops, %ld measured at the link, %ld unstable: frequency within %.1e, "
+        "ratio within %.1e, %ld margins within %.1e\n",
+        worst.modes, loops, links, unstable, worst.frequency, worst.ratio, bounded, worst.margin);
+  }
 };
 
 /// A loop drawn from a seed: arm, gears of 5e3 to 1e5 N m/rad, sensor, rotors,
@@ -66,10 +102,9 @@ class DrawnElasticLoop {
     draw_gains();
   }
 
-  bool link() const { return link_; }
-
   ElasticDifference compare() {
     ElasticDifference result;
+    result.link = link_;
     const Eigen::Index n = q_.size();
     const auto weight = [&](const sim::JointVector& q) {
       return controller::evaluate(twin_.model, q, sim::JointVector::Zero(n)).gravity;

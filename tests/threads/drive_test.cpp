@@ -61,6 +61,25 @@ class Drive : public AtPace, public ::testing::WithParamInterface<Arm> {
   }
   /// Holds the arm, and moves it where it is told.
   void hold_and_move();
+  /// Neither gaps of a machine that is busy nor old commands end anything.
+  std::string patient_configuration(const Scratch& scratch) const {
+    return changed_configuration(
+        scratch, arm,
+        {{"analysis:",
+          "commands: {silence: 30 s, oldest: 20 s}\nwatchdog: {longest_gap: 200 ms}\nanalysis:"}});
+  }
+  /// Sends the command until the loop has it, as a busy machine may lose a message.
+  template <class Done>
+  static bool command_until(Listener& listener, const command_t& command, const Done& done) {
+    std::int64_t sent = -1;
+    return listener.until([&] {
+      if (listener.state.commander == 0 && (sent < 0 || listener.states - sent > 500)) {
+        sent = listener.states;
+        listener.bus().publish(lcmtypes::kCommandChannel, &command);
+      }
+      return done();
+    });
+  }
 
   Arm arm = GetParam();
   std::string url = own_url();
@@ -72,10 +91,7 @@ class Drive : public AtPace, public ::testing::WithParamInterface<Arm> {
 
 void Drive::hold_and_move() {
   const Scratch scratch;
-  const std::string config = changed_configuration(
-      scratch, arm,
-      {{"analysis:",  // gaps are for a machine that is busy
-        "commands: {silence: 30 s, oldest: 20 s}\nwatchdog: {longest_gap: 200 ms}\nanalysis:"}});
+  const std::string config = patient_configuration(scratch);
   Listener listener(url);
   Running fake(driver());
   const std::string log = scratch.path("drive.lcm");
@@ -97,13 +113,7 @@ void Drive::hold_and_move() {
   const double start = listener.state.joint_position[0];
   const command_t command =
       joint_command(listener.state, listener.state.reference_joint_position[0] + 0.1, 1);
-  std::int64_t sent = -1;
-  EXPECT_TRUE(listener.until([&] {
-    // A busy machine may lose a message: it is sent until the loop has it.
-    if (listener.state.commander == 0 && (sent < 0 || listener.states - sent > 500)) {
-      sent = listener.states;
-      listener.bus().publish(lcmtypes::kCommandChannel, &command);
-    }
+  EXPECT_TRUE(command_until(listener, command, [&] {
     return std::abs(listener.state.joint_position[0] - start - 0.1) < 2e-3 &&
            std::abs(listener.state.joint_velocity[0]) < 2e-3 &&
            std::abs(listener.state.reference_joint_position[0] - start - 0.1) < 1e-9;
@@ -136,25 +146,16 @@ TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
 /// SIGTERM reaches an arm on its way: its torque fades where it stands.
 TEST_P(Drive, StopsTheArmBeforeTheTorqueFades) {
   const Scratch scratch;
-  const std::string config = changed_configuration(
-      scratch, arm,
-      {{"analysis:",  // gaps are for a machine that is busy
-        "commands: {silence: 30 s, oldest: 20 s}\nwatchdog: {longest_gap: 200 ms}\nanalysis:"}});
+  const std::string config = patient_configuration(scratch);
   Listener listener(url);
   Running fake(driver());
   const std::string log = scratch.path("drive.lcm");
   Running driving(drive(config, {"--commands", "--log", log}));
   if (!listener.until([&] { return listener.states > 100; }, driving)) GTEST_SKIP() << kNoMulticast;
-  std::int64_t sent = -1;
-  ASSERT_TRUE(listener.until([&] {
-    if (listener.state.commander == 0 && (sent < 0 || listener.states - sent > 500)) {
-      sent = listener.states;
-      const command_t command =
-          joint_command(listener.state, listener.state.reference_joint_position[0] + 1, utime());
-      listener.bus().publish(lcmtypes::kCommandChannel, &command);
-    }
-    return listener.state.joint_velocity[0] > 0.1;
-  }));
+  const command_t command =
+      joint_command(listener.state, listener.state.reference_joint_position[0] + 1, 1);
+  ASSERT_TRUE(
+      command_until(listener, command, [&] { return listener.state.joint_velocity[0] > 0.1; }));
   driving.send(SIGTERM);
   const Json ended = summary_of(driving)["ended"];
   if (ended == "ended by the user, without the driver") GTEST_SKIP() << kNoPace;
