@@ -178,12 +178,10 @@ TEST(Excite, RefusesWhatIsTooMuch) {
   for (const auto& [words, reason] : cases) EXPECT_THAT(said(words), HasSubstr(reason)) << words;
   const Outcome deaf = run_scene(calm_scene(scratch, "feed_forward: {wrench: false}"),
                                  {"--excite", "pulse,direction=z,force=1,duration=0.5"});
-  EXPECT_EQ(deaf.status, 2);
-  EXPECT_THAT(deaf.err, HasSubstr("--excite: needs feed_forward.wrench: true"));
+  expect_refusal(deaf, "--excite: needs feed_forward.wrench: true");
   const Outcome masses =
       run_scene(scene("chain3"), {"--excite", "pulse,direction=z,force=1,duration=0.5"});
-  EXPECT_EQ(masses.status, 2);
-  EXPECT_THAT(masses.err, HasSubstr("--excite: has nothing to excite"));
+  expect_refusal(masses, "--excite: has nothing to excite");
 }
 
 }  // namespace

@@ -241,23 +241,22 @@ TEST(Inspect, ShowsTablesToPeople) {
 }
 
 TEST(Inspect, RefusesNumbersThatDoNotFit) {
-  for (const auto& [option, numbers, reason] : {
-           std::tuple("--q", "1,2", "2 numbers, expected 7"),
-           {"--qd", "1,2,3,4,5,6,7,8", "8 numbers, expected 7"},
-           {"--q", "0,0,0,0,0,0,nan", "is not finite: 'nan'"},
-           {"--q", "0,0,0,0,0,0,1e999", "is not finite: '1e999'"},
-           {"--q", "0,0,0,,0,0,0", "is not a number but ''"},
-           {"--q", "0,0,0,0,0,0,1x", "is not a number but '1x': unknown unit 'x'"},
-           {"--q", "0,0,0,0,0,0,1 m", "has a wrong unit: '1 m'; rad is wanted"},
-           {"--gravity", "9.81", "1 number, expected 3"},
-           {"--reflected-inertia", "1,2", "2 numbers, expected 1 or 7"},
-           {"--reflected-inertia", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1",
-            "17 numbers, expected 1 or 7"},
-           {"--reflected-inertia", "-1", "a number is negative"},
-       }) {
-    expect_refusal(inspect_panda({option, numbers}),
-                   "dashpot inspect: " + std::string(option) + ": " + reason);
-  }
+  expect_refusals(
+      of_panda("inspect", {}),
+      {
+          {{"--q", "1,2"}, "--q: 2 numbers, expected 7"},
+          {{"--qd", "1,2,3,4,5,6,7,8"}, "--qd: 8 numbers, expected 7"},
+          {{"--q", "0,0,0,0,0,0,nan"}, "--q: is not finite: 'nan'"},
+          {{"--q", "0,0,0,0,0,0,1e999"}, "--q: is not finite: '1e999'"},
+          {{"--q", "0,0,0,,0,0,0"}, "--q: is not a number but ''"},
+          {{"--q", "0,0,0,0,0,0,1x"}, "--q: is not a number but '1x': unknown unit 'x'"},
+          {{"--q", "0,0,0,0,0,0,1 m"}, "--q: has a wrong unit: '1 m'; rad is wanted"},
+          {{"--gravity", "9.81"}, "--gravity: 1 number, expected 3"},
+          {{"--reflected-inertia", "1,2"}, "--reflected-inertia: 2 numbers, expected 1 or 7"},
+          {{"--reflected-inertia", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1"},
+           "--reflected-inertia: 17 numbers, expected 1 or 7"},
+          {{"--reflected-inertia", "-1"}, "--reflected-inertia: a number is negative"},
+      });
 }
 
 TEST(Inspect, RefusesFilesAndLinksThatDoNotFit) {

@@ -20,11 +20,12 @@ TEST(Mistakes, InNamesOfSubcommandsAreGuessed) {
                                     {"idnetify", "identify"},
                                     {"checkmodel", "check-model"},
                                     {"insp", "inspect"}}) {
-    expect_refusal(run_program({word, "x"}), std::string("did you mean ") + meant + "?");
+    expect_refusal(run_program({word, "x"}),
+                   std::string("'") + word + "' is no subcommand; did you mean " + meant + "?");
   }
   expect_refusal(run_program({"help"}), "dashpot --help is meant");
   expect_refusal(run_program({"version"}), "dashpot --version is meant");
-  expect_refusal(run_program({"x"}), "there are analyze, inspect, ");
+  expect_refusal(run_program({"x"}), "'x' is no subcommand; there are analyze, inspect, ");
 }
 
 TEST(Mistakes, InNamesOfOptionsAreGuessed) {

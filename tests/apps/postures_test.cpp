@@ -163,9 +163,6 @@ TEST(Options, OfOneMeaningTakeEitherName) {
 }
 
 TEST(MistypedWords, AreNamedWithWhatMayBeMeant) {
-  expect_refusal(run_program({"analyse", "x"}),
-                 "'analyse' is no subcommand; did you mean analyze?");
-  expect_refusal(run_program({"xyz"}), "'xyz' is no subcommand; there are analyze, inspect, ");
   expect_refusal(ask_panda("audit", kGains, {"--q", "0,-45 degrees,0,-2,0,2,0"}),
                  "unknown unit 'degrees'; write deg");
   const Scratch scratch;

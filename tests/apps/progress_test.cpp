@@ -20,30 +20,15 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 /// Runs `dashpot ARGUMENTS...` with a terminal as standard error, which is read into Outcome::err.
-/// Calls `on_text` after each piece of it with the process and all that was read.
+/// Calls `on_text` after each piece of it with the program and all that was read.
 Outcome run_on_terminal(const Words& arguments,
-                        const std::function<void(pid_t, const std::string&)>& on_text) {
-  const Scratch scratch;
+                        const std::function<void(Running&, const std::string&)>& on_text) {
   const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
   if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) {
     throw std::runtime_error("no terminal");
   }
-  const std::string name = ptsname(terminal), out = scratch.path("out");
-  Words words = joined({DASHPOT_PROGRAM}, arguments);
-  std::vector<char*> argv(words.size() + 1, nullptr);
-  std::transform(words.begin(), words.end(), argv.begin(),
-                 [](std::string& word) { return word.data(); });
-  posix_spawn_file_actions_t files;
-  posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT, 0600);
-  posix_spawn_file_actions_addopen(&files, STDERR_FILENO, name.c_str(), O_RDWR | O_NOCTTY, 0);
-  pid_t child = 0;
-  const int failure = posix_spawn(&child, argv[0], &files, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&files);
-  if (failure != 0) throw std::runtime_error("cannot start " + words[0]);
+  Running program(arguments, {.err = ptsname(terminal)});
   Outcome outcome;
-  int wait_status = 0;
   bool ended = false;
   const auto read_on = [&] {
     pollfd ready{terminal, POLLIN, 0};
@@ -52,25 +37,27 @@ Outcome run_on_terminal(const Words& arguments,
       const ssize_t size = read(terminal, text, sizeof text);
       if (size <= 0) break;
       outcome.err.append(text, static_cast<std::size_t>(size));
-      if (!ended) on_text(child, outcome.err);
+      if (!ended) on_text(program, outcome.err);
     }
   };
   while (!ended) {
     read_on();
-    ended = waitpid(child, &wait_status, WNOHANG) == child;
+    ended = program.ended();
   }
   read_on();
   close(terminal);
-  outcome.status = WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : 128 + WTERMSIG(wait_status);
-  outcome.out = scratch.read("out");
+  outcome.status = program.finish();
+  outcome.out = program.output();
   return outcome;
 }
 
 /// The same, ended by Ctrl-C once a bar is seen.
 Outcome interrupted(const Words& arguments) {
   bool sent = false;
-  return run_on_terminal(arguments, [&](pid_t child, const std::string& text) {
-    if (!sent && text.find(" %") != std::string::npos) sent = kill(child, SIGINT) == 0;
+  return run_on_terminal(arguments, [&](Running& program, const std::string& text) {
+    if (sent || text.find(" %") == std::string::npos) return;
+    program.send(SIGINT);
+    sent = true;
   });
 }
 
@@ -152,8 +139,9 @@ TEST(Progress, OfManySystemsIsABarAndCtrlCLeavesThoseDone) {
 }
 
 TEST(Progress, OfARunTellsTimesAndOverruns) {
-  const Outcome outcome = run_on_terminal(
-      {"run", scene("chain3"), "--duration", "2.5", "--lcm-url", own_url()}, [](auto, auto&) {});
+  const Outcome outcome =
+      run_on_terminal({"run", scene("chain3"), "--duration", "2.5", "--lcm-url", own_url()},
+                      [](Running&, auto&) {});
   EXPECT_EQ(outcome.status, 0);
   EXPECT_THAT(outcome.err, HasSubstr(" of 2.50 s, "));
   EXPECT_THAT(outcome.err, HasSubstr(" overruns"));
@@ -179,24 +167,15 @@ TEST(Progress, CtrlCEndsAnExportWithWholeFiles) {
     const bool written = write(end, text.data(), text.size()) > 0;
     for (;;) written ? pause() : (_exit(1), 0);
   }
-  pid_t program = fork();
-  if (program == 0) {
-    const std::string err = scratch.path("err"), out = scratch.path("out");
-    dup2(open(err.c_str(), O_WRONLY | O_CREAT, 0600), STDERR_FILENO);
-    dup2(open(out.c_str(), O_WRONLY | O_CREAT, 0600), STDOUT_FILENO);
-    execl(DASHPOT_PROGRAM, "dashpot", "export", pipe.c_str(), "--csv", csv.c_str(), nullptr);
-    _exit(1);
-  }
-  while (text_of(csv).empty()) usleep(10'000);
-  kill(program, SIGINT);
-  int status = 0;
-  ASSERT_EQ(waitpid(program, &status, 0), program);
+  Running program({"export", pipe, "--csv", csv});
+  while (text_of(csv).empty() && !program.ended()) usleep(10'000);
+  program.send(SIGINT);
+  EXPECT_EQ(program.finish(), 130);
   kill(writer, SIGKILL);
   waitpid(writer, nullptr, 0);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 130);
-  EXPECT_THAT(scratch.read("out"), HasSubstr(" messages exported, "));
-  EXPECT_THAT(scratch.read("err"), HasSubstr("interrupted: the files hold"));
+  EXPECT_THAT(program.output(), HasSubstr(" messages exported, "));
+  EXPECT_THAT(program.complaints(), HasSubstr("interrupted: the files hold"));
+  ASSERT_FALSE(text_of(csv).empty());
   EXPECT_EQ(text_of(csv).back(), '\n');
 }
 
@@ -204,27 +183,17 @@ TEST(Progress, CtrlCEndsACheckOfAModelAtOnce) {
   const Scratch scratch;
   const std::string pipe = scratch.path("pipe.csv");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  const pid_t program = fork();
-  if (program == 0) {
-    dup2(open(scratch.path("err").c_str(), O_WRONLY | O_CREAT, 0600), STDERR_FILENO);
-    execl(DASHPOT_PROGRAM, "dashpot", "check-model", pipe.c_str(), "--config",
-          scene("panda_release_c1").c_str(), nullptr);
-    _exit(1);
-  }
-  int status = 0, end = -1;
-  pid_t ended = 0;
-  while (end < 0 && ended == 0) {  // until it reads, and waits for more
+  Running program({"check-model", pipe, "--config", scene("panda_release_c1")});
+  int end = -1;
+  while (end < 0 && !program.ended()) {  // until it reads, and waits for more
     end = open(pipe.c_str(), O_WRONLY | O_NONBLOCK);
     usleep(10'000);
-    ended = waitpid(program, &status, WNOHANG);
   }
-  ASSERT_EQ(ended, 0);
-  kill(program, SIGINT);
-  ASSERT_EQ(waitpid(program, &status, 0), program);
+  ASSERT_FALSE(program.ended());
+  program.send(SIGINT);
+  EXPECT_EQ(program.finish(), 130);
   close(end);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 130);
-  EXPECT_EQ(scratch.read("err"), "dashpot check-model: interrupted\n");
+  EXPECT_EQ(program.complaints(), "dashpot check-model: interrupted\n");
 }
 
 /// Where every write fails, each writer says so, with the name of the file.

@@ -119,20 +119,19 @@ TEST(Run, NamesTheKeyOfStepsThatAreTooLong) {
 }
 
 TEST(Run, NamesBadOptions) {
-  const auto expect_error = [](const Words& options, const std::string& text) {
-    const Outcome outcome = run_scene(scene("ur5"), options);
-    expect_refusal(outcome, text);
-    EXPECT_THAT(outcome.err, StartsWith("dashpot run: "));
-  };
-  expect_error({"--duration", "-1"}, "--duration");
-  expect_error({"--duration", "nan"}, "--duration");
-  expect_error({"--duration", "1 m"}, "--duration: a time from 1e-6 to 1e7 s is wanted, not '1 m'");
-  expect_error({"--realtime"}, "--realtime");
-  expect_error({"--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");
-  expect_error({"--log", "/nonexistent/a.lcm"}, "/nonexistent/a.lcm: cannot write the log");
-  expect_error({"--csv", "/nonexistent/a.csv"},
-               "--csv: /nonexistent/a.csv: cannot write: No such file or directory");
-  expect_error({"--plugin", "/nonexistent/a.so"}, "--plugin: cannot load the controller");
+  expect_refusals(
+      {"run", scene("ur5"), "--fast"},
+      {
+          {{"--duration", "-1"}, "--duration"},
+          {{"--duration", "nan"}, "--duration"},
+          {{"--duration", "1 m"}, "--duration: a time from 1e-6 to 1e7 s is wanted, not '1 m'"},
+          {{"--realtime"}, "--realtime"},
+          {{"--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x"},
+          {{"--log", "/nonexistent/a.lcm"}, "/nonexistent/a.lcm: cannot write the log"},
+          {{"--csv", "/nonexistent/a.csv"},
+           "--csv: /nonexistent/a.csv: cannot write: No such file or directory"},
+          {{"--plugin", "/nonexistent/a.so"}, "--plugin: cannot load the controller"},
+      });
 }
 
 }  // namespace

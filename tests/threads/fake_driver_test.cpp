@@ -162,25 +162,14 @@ TEST(FakeDriver, DiesWhereItIsAskedTo) {
 }
 
 TEST(FakeDriver, RefusesWhatItCannotBe) {
-  struct Refusal {
-    std::string said;
-    std::vector<std::string> words;
-  };
-  const std::string panda = scene("drivers/panda");
-  for (const auto& [said, words] :
-       std::vector<Refusal>{{"robot.gravity: must be [0, 0, 0]",
-                             {scene("panda_release_c2"), "--panda", "--duration", "0.1"}},
-                            {"", {panda, "--panda", "--iiwa"}},
-                            {"one of them is wanted", {panda}},
-                            {"user-stop is for --panda",
-                             {scene("drivers/iiwa14"), "--iiwa", "--trouble", "user-stop"}},
-                            {"--trouble", {panda, "--panda", "--from", "1"}}}) {
-    std::vector<std::string> all = words;
-    all.insert(all.begin(), "fake-driver");
-    const Outcome outcome = run_program(all);
-    EXPECT_EQ(outcome.status, 2) << said;
-    EXPECT_THAT(outcome.err, HasSubstr(said));
-  }
+  const std::string panda = scene("drivers/panda"), iiwa = scene("drivers/iiwa14");
+  expect_refusals({"fake-driver"},
+                  {{{scene("panda_release_c2"), "--panda", "--duration", "0.1"},
+                    "robot.gravity: must be [0, 0, 0]"},
+                   {{panda, "--panda", "--iiwa"}, ""},
+                   {{panda}, "one of them is wanted"},
+                   {{iiwa, "--iiwa", "--trouble", "user-stop"}, "user-stop is for --panda"},
+                   {{panda, "--panda", "--from", "1"}, "--trouble"}});
 }
 
 }  // namespace

@@ -21,54 +21,6 @@ namespace dashpot::tests {
 using Clock = std::chrono::steady_clock;
 using testing::kHang;
 
-/// A `dashpot` that runs beside the test, with its output in files.
-class Running {
- public:
-  explicit Running(std::vector<std::string> words) {
-    words.insert(words.begin(), DASHPOT_PROGRAM);
-    std::vector<char*> argv;
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    child_ = fork();
-    if (child_ != 0) return;
-    std::signal(SIGHUP, SIG_DFL);  // which nohup has ignored
-    if (std::freopen(out().c_str(), "w", stdout) == nullptr ||
-        std::freopen(err().c_str(), "w", stderr) == nullptr) {
-      _exit(126);
-    }
-    execv(argv[0], argv.data());
-    _exit(127);
-  }
-  Running(const Running&) = delete;
-  Running& operator=(const Running&) = delete;
-  ~Running() {
-    if (child_ > 0) kill(child_, SIGKILL), waitpid(child_, nullptr, 0);
-  }
-
-  void send(int signal) const {
-    if (child_ > 0) kill(child_, signal);
-  }
-  /// Whether it has ended; its exit status is kept.
-  bool ended(int options = WNOHANG) {
-    if (child_ > 0 && waitpid(child_, &status_, options) == child_) child_ = 0;
-    return child_ == 0;
-  }
-  /// Waits for the end; the exit status.
-  int finish() {
-    ended(0);
-    return WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_);
-  }
-  std::string out() const { return scratch_.path("out"); }
-  std::string err() const { return scratch_.path("err"); }
-  std::string output() const { return scratch_.read("out"); }
-  std::string complaints() const { return scratch_.read("err"); }
-
- private:
-  Scratch scratch_;
-  pid_t child_ = 0;
-  int status_ = 0;
-};
-
 /// Waits for the end of a loop with --json, and returns what it says; its exit status is 1 only if
 /// a fault is latched at the end.
 inline nlohmann::json summary_of(Running& loop) {

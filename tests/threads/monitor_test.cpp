@@ -273,24 +273,20 @@ TEST(Monitor, SaysThatALogIsEmpty) {
 }
 
 TEST(Monitor, NamesWhatIsWrongWithItsInput) {
-  const auto expect_error = [](const std::vector<std::string>& arguments, const std::string& text) {
-    const Outcome outcome = run_program(arguments);
-    EXPECT_EQ(outcome.status, 2);
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
-    EXPECT_THAT(outcome.err, AllOf(StartsWith("dashpot monitor: "), HasSubstr(text)));
-  };
-  expect_error({"monitor", "--log", "/nonexistent/a.lcm"},
-               "/nonexistent/a.lcm: cannot read the log: No such file or directory");
   const Scratch scratch;
   const std::string text = scratch.write("a.txt", std::string(200, 'x'));
-  expect_error({"monitor", "--log", text}, "a.txt: is no LCM log");
-  expect_error({"monitor", "--log", scratch.path("")}, "cannot read the log: Is a directory");
-  expect_error({"monitor", "--log", ""}, "--log: names no file");
-  expect_error({"monitor", "--log", text, "--speed", "nan"}, "--speed");
-  expect_error({"monitor", "--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");
-  expect_error({"monitor", "--log", "a", "--lcm-url", "memq://"}, "--lcm-url");
-  expect_error({"monitor", "--log", "a", "--speed", "-1"}, "--speed");
+  expect_refusals({"monitor"},
+                  {
+                      {{"--log", "/nonexistent/a.lcm"},
+                       "/nonexistent/a.lcm: cannot read the log: No such file or directory"},
+                      {{"--log", text}, "a.txt: is no LCM log"},
+                      {{"--log", scratch.path("")}, "cannot read the log: Is a directory"},
+                      {{"--log", ""}, "--log: names no file"},
+                      {{"--log", text, "--speed", "nan"}, "--speed"},
+                      {{"--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x"},
+                      {{"--log", "a", "--lcm-url", "memq://"}, "--lcm-url"},
+                      {{"--log", "a", "--speed", "-1"}, "--speed"},
+                  });
 }
 
 /// A `dashpot monitor` that runs beside the test, on a terminal of its own.

@@ -373,33 +373,22 @@ TEST(WebMonitor, AndExportRefuseBadInput) {
   const std::string no_modes = scratch.write("i", "{}"),
                     no_number = scratch.write("j", R"({"modes": [{"natural_frequency": "x"}]})");
   const Site first({"--log", log});
-  struct Refusal {
-    std::string said;
-    std::vector<std::string> words;
-  };
-  for (const auto& [said, words] : std::vector<Refusal>{
-           {"--log: ", {"monitor", "--web", "0", "--log", text}},
-           {"--log: ", {"monitor", "--web", "0", "--log", "/nonexistent.lcm"}},
-           {"/nonexistent.yaml", {"monitor", "--web", "0", "--config", "/nonexistent.yaml"}},
-           {"--web", {"monitor", "--web", "70000"}},
-           {"--web", {"monitor", "--config", "x"}},
-           {"\"modes\"", {"monitor", "--web", "0", "--log", log, "--identified", no_modes}},
-           {"\"natural_frequency\"",
-            {"monitor", "--web", "0", "--log", log, "--identified", no_number}},
-           {"in use", {"monitor", "--web", std::to_string(first.port), "--log", log}},
-           {"", {"export", log}},
-           {"", {"export", log, "--csv", log}},
-           {"", {"export", log, "--csv", scratch.path("x"), "--mcap", scratch.path("x")}},
-           {"", {"export", text, "--csv", scratch.path("y")}},
-           {"", {"export", "/nonexistent.lcm", "--csv", scratch.path("y")}},
-           {"", {"export", log, "--csv", "/nonexistent/y"}}}) {
-    SCOPED_TRACE(::testing::PrintToString(words));
-    const Outcome outcome = run_program(words);
-    EXPECT_EQ(outcome.status, 2);
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_THAT(outcome.err, HasSubstr(said));
-    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
-  }
+  expect_refusals(
+      {"monitor"},
+      {{{"--web", "0", "--log", text}, "--log: "},
+       {{"--web", "0", "--log", "/nonexistent.lcm"}, "--log: "},
+       {{"--web", "0", "--config", "/nonexistent.yaml"}, "/nonexistent.yaml"},
+       {{"--web", "70000"}, "--web"},
+       {{"--config", "x"}, "--web"},
+       {{"--web", "0", "--log", log, "--identified", no_modes}, "\"modes\""},
+       {{"--web", "0", "--log", log, "--identified", no_number}, "\"natural_frequency\""},
+       {{"--web", std::to_string(first.port), "--log", log}, "in use"}});
+  expect_refusals({"export"}, {{{log}, ""},
+                               {{log, "--csv", log}, ""},
+                               {{log, "--csv", scratch.path("x"), "--mcap", scratch.path("x")}, ""},
+                               {{text, "--csv", scratch.path("y")}, ""},
+                               {{"/nonexistent.lcm", "--csv", scratch.path("y")}, ""},
+                               {{log, "--csv", "/nonexistent/y"}, ""}});
 }
 
 }  // namespace
