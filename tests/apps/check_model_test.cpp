@@ -47,14 +47,9 @@ std::string csv(const std::function<std::string(int)>& position, double factor,
   for (const int j : order) text += "," + position(j);
   for (const int j : order) text += "," + torque(j);
   text += "\n";
-  std::array<char, 40> cell{};
-  const auto add = [&](double value) {
-    std::snprintf(cell.data(), cell.size(), ",%.7f", value);
-    text += cell.data();
-  };
+  const auto add = [&](double value) { text += printed(",%.7f", value); };
   for (Eigen::Index i = 0; i < record.time.size(); ++i) {
-    std::snprintf(cell.data(), cell.size(), "%g", 0.5 + record.time[i]);  // whole: without a point
-    text += cell.data();
+    text += printed("%g", 0.5 + record.time[i]);  // whole: without a point
     for (const int j : order) add(factor * record.position(j, i));
     for (const int j : order) add(record.torque(j, i));
     text += "\n";

@@ -60,12 +60,6 @@ std::string stamped(const std::string& heading, const std::function<std::string(
   return text;
 }
 
-std::string printed(const char* format, double value) {
-  std::array<char, 60> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
-
 /// Whole seconds lose their point, small times get an exponent, large ones have many digits; no
 /// sample is lost in any of them.
 TEST(IdentifyFiles, TakesTimesAsTheyAreWritten) {

@@ -25,10 +25,8 @@ inline std::string decay_csv(const std::string& heading, double angle, double ti
       return t < 0 ? 1 : std::exp(-z * w * t) * std::cos(w * std::sqrt(1 - z * z) * t);
     };
     const double x = 0.02 * wave(9, 0.12), y = 0.02 * wave(14, 0.55);
-    std::array<char, 200> line{};
-    std::snprintf(line.data(), line.size(), "%.6f,%.9f,%.9f\n", time * (t + 0.5),
-                  angle * (x + y / 2 + noise()), angle * (x / 2 - y + noise()));
-    text += line.data();
+    text += printed("%.6f,%.9f,%.9f\n", time * (t + 0.5), angle * (x + y / 2 + noise()),
+                    angle * (x / 2 - y + noise()));
   }
   return text;
 }

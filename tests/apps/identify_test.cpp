@@ -41,11 +41,9 @@ std::string shaken_csv() {
   for (int i = 0; i < 30000; ++i) {
     first.step(0.01 * draw.normal());
     second.step(0.03 * draw.normal());
-    std::array<char, 200> line{};
-    std::snprintf(line.data(), line.size(), "%.3f,%.9f,%.9f\n", 0.01 * i,
-                  0.3 + first.x + second.x / 2 + 1e-5 * draw.normal(),
-                  first.x / 2 - second.x + 1e-5 * draw.normal());
-    text += line.data();
+    text +=
+        printed("%.3f,%.9f,%.9f\n", 0.01 * i, 0.3 + first.x + second.x / 2 + 1e-5 * draw.normal(),
+                first.x / 2 - second.x + 1e-5 * draw.normal());
   }
   return text;
 }
@@ -84,10 +82,8 @@ TEST(Identify, SaysFirstWhatARecordShows) {
     std::string text = "time [s],q1 [rad],force [N]\n";
     testing::Dice draw(5);
     for (int i = 0; i < 4000; ++i) {
-      std::array<char, 100> line{};
-      std::snprintf(line.data(), line.size(), "%.3f,%.9f,%.6f\n", 0.01 * i,
-                    size * motion(0.01 * i) + 1e-6 * draw.normal(), draw.normal());
-      text += line.data();
+      text += printed("%.3f,%.9f,%.6f\n", 0.01 * i, size * motion(0.01 * i) + 1e-6 * draw.normal(),
+                      draw.normal());
     }
     return scratch.write(name, text);
   };
@@ -146,9 +142,7 @@ TEST(Identify, LeavesOutWhatIsClipped) {
     double t = 0, a = 0, b = 0;
     std::sscanf(rows.substr(at, end - at).c_str(), "%lf,%lf,%lf", &t, &a, &b);
     at = end + 1;
-    std::array<char, 100> line{};
-    std::snprintf(line.data(), line.size(), "%.4f,%.9f,%.9f\n", t, std::max(a, -0.008), b);
-    text += line.data();
+    text += printed("%.4f,%.9f,%.9f\n", t, std::max(a, -0.008), b);
   }
   const Json found = identify({scratch.write("clipped.csv", text)});
   ASSERT_EQ(found["modes"].size(), 2U);
@@ -165,10 +159,7 @@ TEST(Identify, TakesInputsFromColumns) {
   double x = 0, v = 0;
   for (int i = 0; i < 1600; ++i) {
     const double t = 0.005 * i, u = std::sin(6.283185307179586 * t * (0.3 + 0.29 * t));
-    std::array<char, 200> line{};
-    std::snprintf(line.data(), line.size(), "%.4f,%.9f,0.5,%.9f\n", t, x + 1e-5 * draw.normal(),
-                  10 * u);
-    text += line.data();
+    text += printed("%.4f,%.9f,0.5,%.9f\n", t, x + 1e-5 * draw.normal(), 10 * u);
     for (int part = 0; part < 50; ++part) {
       v += 0.0001 * (u - 2 * 0.12 * 9 * v - 81 * x);
       x += 0.0001 * v;

@@ -81,9 +81,7 @@ TEST(Inspect, PrintsWhatKdlComputesForEachArm) {
     std::string q;
     for (int i = 0; i < model.dof(); ++i) {
       position[i] += (i % 2 == 0 ? 0.1 : -0.1) * (i + 1);
-      std::array<char, 40> text{};
-      std::snprintf(text.data(), text.size(), "%s%.17g", i > 0 ? "," : "", position[i]);
-      q += text.data();
+      q += printed("%s%.17g", i > 0 ? "," : "", position[i]);
     }
     velocity.head(6) << 1, 0, -1, 0.5, 1, -1;
     if (!six) velocity[6] = 0.1;

@@ -11,7 +11,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <csignal>
+#include <cstdarg>
+#include <cstdio>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -24,6 +27,16 @@ using Words = std::vector<std::string>;
 inline Words joined(Words first, const Words& second) {
   first.insert(first.end(), second.begin(), second.end());
   return first;
+}
+
+/// What printf prints.
+[[gnu::format(printf, 1, 2)]] inline std::string printed(const char* format, ...) {
+  std::array<char, 400> text{};
+  va_list values;
+  va_start(values, format);
+  std::vsnprintf(text.data(), text.size(), format, values);
+  va_end(values);
+  return text.data();
 }
 
 /// `dashpot SUBCOMMAND` of a Panda, with `more` words.

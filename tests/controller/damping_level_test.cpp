@@ -40,7 +40,6 @@ Settings plain(const RobotModel& model, Mode mode) {
   Settings settings = testing::in_mode(testing::unlimited_settings(model), mode);
   settings.motion.gain_time = settings.period;
   settings.analysis.where = Analysis::Where::kOff;
-  settings.limits.beyond_model = true;
   settings.limits.torque *= 1e3;
   settings.limits.torque_rate *= 1e6;
   return settings;

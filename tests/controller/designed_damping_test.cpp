@@ -134,7 +134,6 @@ TEST(DesignedDamping, LosesNoModesOfALongChain) {
   const RobotModel model = RobotModel::from_urdf_text(random.chain(14, 0), "link0", "tip");
   Settings settings = testing::in_mode(testing::unlimited_settings(model), Mode::kCartesian);
   settings.initial.gains.task_damping_ratio = 0.7;
-  settings.limits.beyond_model = true;
   settings.limits.torque.setConstant(1e4);  // holds the weight
   LedArm led(model, settings, 0.2);
   led.place(led.center = settings.initial.joint_position);

@@ -47,7 +47,6 @@ ModelOptions gears(int n, double stiffness, PositionSensor sensor, double dampin
 /// Settings without limits, and with a brake that these gears bear.
 Settings settings_of(const RobotModel& model, Mode mode) {
   Settings settings = testing::in_mode(testing::unlimited_settings(model), mode);
-  settings.limits.beyond_model = true;
   settings.limits.stopping_time = 1;
   settings.limits.position_upper.setConstant(kInfinite);
   settings.limits.position_lower.setConstant(-kInfinite);

@@ -277,15 +277,6 @@ TEST(ConfigRobot, HasAUrdfThatIsInOrder) {
               ::testing::MatchesRegex("robot.*2 entries.* \\(line 2\\)"));
 }
 
-TEST(ConfigRobot, HasAUrdfThatAParserCanBear) {
-  const Scratch scratch;
-  std::string text = "<robot name='r'>";
-  for (int i = 0; i < 100'000; ++i) text += "<a>";
-  const std::string urdf = scratch.write("deep.urdf", text);
-  EXPECT_EQ(complaint("robot: {urdf: " + urdf + ", base: a, tip: b}\n"),
-            "robot: " + urdf + ": line 1: elements are nested more than 64 deep (line 1)");
-}
-
 TEST(ConfigFile, HasAnEnd) {
   const Scratch scratch;
   const std::string pipe = scratch.path("pipe");

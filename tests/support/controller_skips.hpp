@@ -127,16 +127,8 @@ struct LedPair {
   std::int64_t ticks = 0;
 
  private:
-  /// No limit or watchdog interferes.
-  static Settings quiet(Settings settings) {
-    settings.limits.beyond_model = true;
-    settings.limits.velocity.setConstant(1e3);
-    settings.limits.tip_velocity = 1e3;
-    settings.watchdog.feedback = 0;
-    settings.analysis.share = 1;
-    settings.limits.position_lower.setConstant(-10);
-    settings.limits.position_upper.setConstant(10);
-    return in_mode(settings, controller::Mode::kCartesian);
+  static Settings quiet(const Settings& settings) {
+    return in_mode(without_limits(settings), controller::Mode::kCartesian);
   }
 
   analysis::System<analysis::kMaxDof> system_;

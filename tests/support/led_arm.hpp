@@ -24,8 +24,7 @@ inline controller::RobotModel smooth_panda() {
 }
 
 /// Settings in which no limit or watchdog interferes.
-inline controller::Settings unlimited_settings(const controller::RobotModel& model) {
-  controller::Settings settings = constant_damping(model);
+inline controller::Settings without_limits(controller::Settings settings) {
   settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
   settings.watchdog.feedback = 0;
   settings.analysis.share = 1;
@@ -35,6 +34,10 @@ inline controller::Settings unlimited_settings(const controller::RobotModel& mod
   settings.limits.position_lower.setConstant(-10);
   settings.limits.position_upper.setConstant(10);
   return settings;
+}
+
+inline controller::Settings unlimited_settings(const controller::RobotModel& model) {
+  return without_limits(constant_damping(model));
 }
 
 inline controller::Settings in_mode(controller::Settings settings, controller::Mode mode) {

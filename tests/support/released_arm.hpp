@@ -74,6 +74,14 @@ inline controller::Settings release_settings(const TwinModels& twin, const contr
   return settings;
 }
 
+/// Any torque may act, and an arm may stand still to the last bit.
+inline void allow_any_torque(controller::Settings& settings) {
+  settings.watchdog.feedback = 0;
+  settings.limits.beyond_model = true;
+  settings.limits.torque.setConstant(1e4);
+  settings.limits.torque_rate.setConstant(1e6);
+}
+
 /// The controller starts with its springs at rest at q0, and what it is `told` is attached; then a
 /// hand leads the arm smoothly along q0 + s dq, holds it there, and lets go.
 class ReleasedArm {
