@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <vector>
 
 #define DASHPOT_NEEDS_PROVED_EIGENVALUES() static_cast<void>(0)
@@ -24,27 +25,40 @@ inline void set_whole(fmpz_mat_t whole, const Eigen::MatrixXd& A, int power) {
       int exponent = 0;
       fmpz* const entry = fmpz_mat_entry(whole, i, j);
       fmpz_set_d(entry, std::ldexp(std::frexp(A(i, j), &exponent), 53));
-      fmpz_mul_2exp(entry, entry, static_cast<ulong>(power + exponent - 53));
+      if (A(i, j) != 0) fmpz_mul_2exp(entry, entry, static_cast<ulong>(power + exponent - 53));
     }
   }
+}
+
+/// The least power of two that makes all entries whole numbers.
+inline int whole_power(std::initializer_list<Eigen::MatrixXd> matrices) {
+  int power = 0;
+  for (const Eigen::MatrixXd& A : matrices) {
+    for (const double entry : A.reshaped()) {
+      if (entry != 0) power = std::max(power, 52 - std::ilogb(entry));
+    }
+  }
+  return power;
 }
 
 /// det(l^2 M + l C + K) without common factors, exactly; with a factor W, K = W' W.
 template <int N>
 void set_characteristic(const analysis::System<N>& system, fmpz_poly_t polynomial) {
-  constexpr int kPower = 1200;
   const slong n = system.dof(), p = system.stiffness_factor.rows();
+  const Eigen::MatrixXd factor = system.stiffness_factor;
+  const Eigen::MatrixXd parts[] = {system.stiffness, system.damping, system.mass};
+  const int root = whole_power({factor, parts[0], parts[1], parts[2]}),
+            whole = p > 0 ? 2 * root : root;
   fmpz_poly_mat_t pencil;
   fmpz_mat_t part, W, WT;
   fmpz_poly_mat_init(pencil, n, n);
   fmpz_mat_init(part, n, n);
   fmpz_mat_init(W, p, n);
   fmpz_mat_init(WT, n, p);
-  set_whole(W, system.stiffness_factor, kPower);
+  set_whole(W, factor, root);
   fmpz_mat_transpose(WT, W);
-  const Eigen::MatrixXd parts[] = {system.stiffness, system.damping, system.mass};
   for (slong power = 0; power < 3; ++power) {
-    set_whole(part, parts[power], 2 * kPower);
+    set_whole(part, parts[power], whole);
     if (power == 0 && p > 0) fmpz_mat_mul(part, WT, W);
     for (slong i = 0; i < n * n; ++i) {
       fmpz_poly_set_coeff_fmpz(fmpz_poly_mat_entry(pencil, i / n, i % n), power,

@@ -92,7 +92,8 @@ struct PlainValues {
     for (std::size_t i = 0; i < modes.size(); ++i) {
       for (const analysis::Complex& value : modes[i].eigenvalues) {
         points.emplace_back(value);
-        reach.push_back(modes[i].error_bound + relative * std::abs(value));  // may be infinite
+        const double error = modes[i].error_bound + relative * std::abs(value);  // may be infinite
+        reach.push_back(static_cast<long double>(error));
         mode.push_back(i);
       }
     }
