@@ -12,9 +12,6 @@
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/benchmarks/quadeig.hpp>
-#ifdef DASHPOT_HAVE_ARB
-#include <dashpot/tests/support/certified_spectrum.hpp>
-#endif
 #include <dashpot/tests/support/proved_eigenvalues.hpp>
 
 #include <benchmark/benchmark.h>
@@ -251,8 +248,7 @@ void arb(benchmark::State& state, const Problem& problem, int bits) {
   Values values;
   double bound = 0;
   for (std::size_t i = 0; i < found.center.size(); ++i) {
-    const auto [x, y] = found.center[i];
-    values.emplace_back(static_cast<double>(x), static_cast<double>(y));
+    values.emplace_back(found.center[i]);
     bound = std::max(bound, static_cast<double>(found.radius[i]) / std::abs(values.back()));
   }
   report(state, problem, values);
