@@ -28,11 +28,11 @@ class InvalidSettings : public std::invalid_argument {
 /// in seconds; what it says names the likely unit.
 void validate(const Settings& settings, const RobotModel& model);
 
-/// Lines that ask about gains: whether the rotations of the task's stiffness or damping stand first,
-/// where a tip on a lever of twice the arm's reach would turn harder than it moves, and whether a
-/// damping is ratios, where no number is above 2 and the largest, at the tip against translation,
-/// leaves a mass or an inertia of 1 a ratio below 0.1. Joints with less than 100 N m/rad are not
-/// asked about.
+/// Lines that ask about gains: whether the rotations of the task's stiffness or damping stand
+/// first, where a tip on a lever of twice the arm's reach would turn harder than it moves, and
+/// whether a damping is ratios, where no number is above 2 and the largest, at the tip against
+/// translation, leaves a mass or an inertia of 1 a ratio below 0.1. Joints with less than 100 N
+/// m/rad are not asked about.
 std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains);
 /// The same of an arm of which only the reach is known, m.
 std::vector<std::string> doubtful_gains(double reach, const Gains& gains);

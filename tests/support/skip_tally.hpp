@@ -64,6 +64,10 @@ struct PlainMode {
 };
 using PlainModes = std::vector<PlainMode>;
 
+inline PlainModes plain_modes(const analysis::TrackedSpectrum& spectrum) {
+  return {spectrum.modes.begin(), spectrum.modes.begin() + spectrum.mode_count};
+}
+
 /// Fails unless the same places have the same bits.
 inline void compare_bits(const PlainModes& with, const PlainModes& without, SkipTally& tally) {
   if (with.size() != without.size()) return tally.fail();
