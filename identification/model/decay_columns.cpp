@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace dashpot::identification {
@@ -114,17 +115,62 @@ void add_wave(const DecayFactor& factor, std::size_t source, Index at, const Wav
   }
 }
 
+/// Leads a factor's motion on by one step of time, with its derivatives.
+class Stepper {
+ public:
+  Stepper(const DecayFactor& factor, double step) : over_(wave_at(factor, step)) {
+    const double zeta = factor.second, turn = factor.pair ? 1 - zeta * zeta : 0;
+    back_ = -turn * over_.x[1];
+    back_by_first_ = -turn * over_.by_first[1];
+    back_by_second_ = factor.pair ? 2 * zeta * over_.x[1] - turn * over_.by_second[1] : 0;
+  }
+
+  void lead(Wave& now, bool derivatives) const {
+    const auto [c, S] = over_.x;
+    const auto [x, y] = now.x;
+    if (derivatives) {
+      const auto [c_first, S_first] = over_.by_first;
+      const auto [c_second, S_second] = over_.by_second;
+      const auto [f0, f1] = now.by_first;
+      const auto [s0, s1] = now.by_second;
+      now.by_first = {c * f0 + back_ * f1 + c_first * x + back_by_first_ * y,
+                      S * f0 + c * f1 + S_first * x + c_first * y};
+      now.by_second = {c * s0 + back_ * s1 + c_second * x + back_by_second_ * y,
+                       S * s0 + c * s1 + S_second * x + c_second * y};
+    }
+    now.x = {c * x + back_ * y, S * x + c * y};
+  }
+
+ private:
+  Wave over_;
+  double back_ = 0, back_by_first_ = 0, back_by_second_ = 0;
+};
+
+/// A factor's motion at these times; where they are even, led on from step to step.
+std::vector<Wave> free_waves(const DecayFactor& factor, const VectorXd& time, bool derivatives) {
+  constexpr Index kLed = 64;  // steps, after which rounding is left behind
+  const Index N = time.size();
+  const double step = N > 1 ? time[1] - time[0] : 0;
+  const Stepper stepper(factor, step);
+  std::vector<Wave> waves;
+  waves.reserve(static_cast<std::size_t>(N));
+  for (Index i = 0; i < N; ++i) {
+    const double rounding = 4 * std::numeric_limits<double>::epsilon() * std::abs(time[i]);
+    if (i % kLed != 0 && std::abs(time[i] - time[i - 1] - step) <= rounding) {
+      waves.push_back(waves.back());
+      stepper.lead(waves.back(), derivatives);
+    } else {
+      waves.push_back(wave_at(factor, time[i]));
+    }
+  }
+  return waves;
+}
+
 /// The mean in each of the `cells` of what an input makes of a factor at rest: the sum over the
 /// values before, each a start of the factor's own.
 std::vector<Wave> forced_waves(const DecayFactor& factor, const DrivenGrid& grid, Index input,
                                bool derivatives, const std::vector<Index>& cells) {
-  const Wave over = wave_at(factor, grid.step);
-  const double zeta = factor.second, turn = factor.pair ? 1 - zeta * zeta : 0;
-  const auto [c, S] = over.x;
-  const auto [c_first, S_first] = over.by_first;
-  const auto [c_second, S_second] = over.by_second;
-  const double T = -turn * S, T_first = -turn * S_first,
-               T_second = factor.pair ? 2 * zeta * S - turn * S_second : 0;
+  const Stepper stepper(factor, grid.step);
   std::vector<Wave> result;
   result.reserve(cells.size());
   Wave now, sum;
@@ -150,16 +196,8 @@ std::vector<Wave> forced_waves(const DecayFactor& factor, const DrivenGrid& grid
       within = 0;
       ++cell;
     }
-    const double x = now.x[0] + grid.step * grid.input(input, i), y = now.x[1];
-    if (derivatives) {
-      const auto [f0, f1] = now.by_first;
-      const auto [s0, s1] = now.by_second;
-      now.by_first = {c * f0 + T * f1 + c_first * x + T_first * y,
-                      S * f0 + c * f1 + S_first * x + c_first * y};
-      now.by_second = {c * s0 + T * s1 + c_second * x + T_second * y,
-                       S * s0 + c * s1 + S_second * x + c_second * y};
-    }
-    now.x = {c * x + T * y, S * x + c * y};
+    now.x[0] += grid.step * grid.input(input, i);
+    stepper.lead(now, derivatives);
   }
   return result;
 }
@@ -178,14 +216,16 @@ FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool 
     columns.by_input_scale.assign(inputs, {zero, zero});
   }
   Index from = 0;
-  std::vector<std::pair<double, Wave>> waves;  // that were found: most records have the same times
+  const VectorXd* known = nullptr;  // times: most records have the same
+  std::vector<Wave> waves;
   for (std::size_t r = 0; r < records; ++r) {
     const VectorXd& time = part.time[r];
+    if (known == nullptr || known->size() < time.size() || known->head(time.size()) != time) {
+      waves = free_waves(factor, time, derivatives);
+      known = &time;
+    }
     for (Index i = 0; i < time.size(); ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (k == waves.size()) waves.emplace_back(time[i], wave_at(factor, time[i]));
-      const auto& [known, wave] = waves[k];
-      add_wave(factor, r, from + i, known == time[i] ? wave : wave_at(factor, time[i]), columns,
+      add_wave(factor, r, from + i, waves[static_cast<std::size_t>(i)], columns,
                derivatives ? &columns.by_record_scale : nullptr);
     }
     for (std::size_t j = 0; j < inputs; ++j) {

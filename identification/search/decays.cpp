@@ -163,7 +163,7 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   const bool coloured = search.fit.whiteness > kFarFromWhite;
   const bool doubted = coloured && !rounded && (search.data.inputs == 0 || unexplained > kMuch);
   for (MeasuredMode& mode : modes) {
-    if (mode.stability > 0 && mode.energy < kOfRest * unexplained) {
+    if (mode.stability > 0 && search.data.inputs == 0 && mode.energy < kOfRest * unexplained) {
       mode.reason = "much weaker than what is left over";
     } else if (mode.stability == 0 && mode.energy < unexplained) {
       mode.reason = "weaker than what is left over, and in no model of another order";
