@@ -28,12 +28,12 @@ constexpr const char* kNotLinear =
     "something: larger pushes, a measured excitation (--inputs), or check-model for the friction, "
     "tell more";
 
-/// Whether fewer factors of the model are rejected as what is not linear than are believed.
+/// Whether no more factors of the model are rejected as what friction makes than are believed.
 bool is_linear(const identification::Identification& found) {
   const auto doubted = std::count_if(
       found.rejected.begin(), found.rejected.end(), [](const identification::MeasuredMode& mode) {
-        return mode.reason.find("not linear") != std::string::npos ||
-               mode.reason.find("not believed") != std::string::npos ||
+        return mode.reason.find("may be friction") != std::string::npos ||
+               mode.reason.find("half of this model") != std::string::npos ||
                mode.reason.find("much is left over") != std::string::npos;
       });
   return static_cast<std::size_t>(doubted) <= found.modes.size();
@@ -105,6 +105,7 @@ class Task {
       if (parts_.large) report_.kind = MotionKind::kLargeMotion, report_.advice = kLargeAdvice;
     }
     std::size_t silent = 0;  // postures without modes, because the motion is not linear
+    bool bent = false;       // one with modes
     identification::IdentifyOptions options;
     options.max_order = command_.order;
     const std::vector<std::vector<std::size_t>> groups = by_posture();
@@ -176,10 +177,11 @@ class Task {
       }
       if (report_.kind == MotionKind::kDecays && !is_linear(posture.found)) {
         silent += posture.found.modes.empty();
-        if (!posture.found.modes.empty()) report_.notes.emplace_back(kNotLinear);
+        bent = bent || !posture.found.modes.empty();
       }
       report_.postures.push_back(std::move(posture));
     }
+    if (bent) report_.notes.emplace_back(kNotLinear);
     if (!report_.postures.empty()) {
       report_.advice = silent == report_.postures.size() ? kNotLinear : "";
     } else if (report_.advice == kLargeAdvice) {

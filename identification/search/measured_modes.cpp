@@ -63,7 +63,7 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
   }
 }
 
-/// Relative deviations of what is not determined. Those of a single decay are widened by more.
+/// Relative deviations of what is not determined: of decays more, because those of one are widened.
 constexpr double kUndetermined = 0.05, kUndeterminedInDecays = 0.06;
 constexpr double kHarmonic = 3;  // of friction and other forces that are odd; sums tell even ones
 constexpr double kExplains = 5;  // energy, over a mode's: what is not linear is weaker than that
@@ -193,18 +193,20 @@ void judge(std::vector<MeasuredMode> modes, const Judgement& records, Identifica
     (judged.reason.empty() ? result.modes : result.rejected).push_back(std::move(judged));
   }
   // A model of a decay that is not linear explains it to its noise, with modes that no model of
-  // another order has; that of a linear one has few of those, or nothing in it is rejected. What
-  // moves driven and ambient motion is left over, and its colour tells.
+  // another order has; that of a linear one has fewer of those than others, or all of it is
+  // believed. What moves driven and ambient motion is left over, and its colour tells.
   const auto alone = std::stable_partition(result.modes.begin(), result.modes.end(),
                                            [](const auto& mode) { return mode.stability > 0; });
   const auto stable = static_cast<std::size_t>(alone - result.modes.begin());
-  constexpr double kWhite = 1.5;
-  const bool doubted =
-      records.decays ? !result.rejected.empty() && 2 * stable <= result.modes.size()
-                     : result.whiteness > kWhite && result.rejected.size() > result.modes.size();
-  if (doubted) {
+  constexpr double kWhite = 1.5, kCounts = 1e-3;  // energy of a rejected one
+  const bool whole = std::none_of(result.rejected.begin(), result.rejected.end(),
+                                  [](const auto& mode) { return mode.energy > kCounts; });
+  const bool coloured = result.whiteness > kWhite && result.rejected.size() > result.modes.size();
+  if (records.decays ? !whole && 2 * stable <= result.modes.size() : coloured) {
     for (auto mode = alone; mode != result.modes.end(); ++mode) {
-      mode->reason = "in no model of another order, and most of this one is not believed";
+      mode->reason = records.decays
+                         ? "in no model of another order, as half of this model or more"
+                         : "in no model of another order, and most of this one is not believed";
       result.rejected.push_back(std::move(*mode));
     }
     result.modes.erase(alone, result.modes.end());

@@ -92,6 +92,22 @@ std::vector<MotionRecord> strongest(const std::vector<MotionRecord>& records,
   return chosen;
 }
 
+/// The geometric mean over the records in which a channel moves, as a fit's noise is one; `noise`
+/// of all of them where it moves in none alone.
+VectorXd usual_noise(const std::vector<MotionRecord>& all, const VectorXd& noise,
+                     const VectorXd& motion) {
+  constexpr double kMoves = 1e-9;  // less than this of the motion are digits of a channel at rest
+  VectorXd sum = VectorXd::Zero(noise.size()), count = sum;
+  for (const MotionRecord& record : all) {
+    const VectorXd alone = first_noise({record});
+    for (Index c = 0; c < alone.size(); ++c) {
+      if (alone[c] > kMoves * motion[c]) sum[c] += std::log(alone[c]), ++count[c];
+    }
+  }
+  const VectorXd mean = sum.cwiseQuotient(count.cwiseMax(1)).array().exp();
+  return (count.array() > 0).select(mean, noise);
+}
+
 }  // namespace
 
 ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOptions& options)
@@ -145,10 +161,7 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOpt
   if (larger) larger = fit_decays(data, larger->factors, fit.noise, 30);
   if (larger && larger->criterion < fit.criterion) fit = std::move(*larger), larger.reset();
   forget_useless_larger();
-  VectorXd sensors = VectorXd::Zero(channels);
-  for (const MotionRecord& record : all) sensors += VectorXd(first_noise({record}).array().log());
-  sensors = (sensors / static_cast<double>(all.size())).array().exp();
-  widen(sensors.cwiseMax(DecayData::kLinear * data.motion));
+  widen(usual_noise(all, noise, data.motion).cwiseMax(DecayData::kLinear * data.motion));
 }
 
 ModelSearch::ModelSearch(const ExcitedCells& cells, const IdentifyOptions& options)
