@@ -100,7 +100,8 @@ JointVector weight_of(const HostedController& controller, const Attachment& atta
 /// Sets what dashpot_last_error says; returns `code`.
 std::int32_t finish(std::int32_t code, const char* text) noexcept;
 std::int32_t finish(std::int32_t code) noexcept;
-/// Likewise DASHPOT_OK, with something to be warned of.
+/// Likewise DASHPOT_OK, with something to be warned of after what the call has warned of so far; to
+/// be called after finish(DASHPOT_OK).
 std::int32_t warn(const char* text) noexcept;
 /// Warns of what is doubtful about gains.
 void warn_of_gains(const HostedController& controller, const Gains& gains) noexcept;

@@ -108,6 +108,7 @@ int32_t dashpot_set_payload(dashpot_controller* controller, const dashpot_payloa
     code = check_weight(*controller, wanted, q);
     if (code == DASHPOT_OK) code = judge_change(*controller, gains, wanted, q);
     if (code != DASHPOT_OK) return code;
+    if (payload->gains != nullptr) warn_of_gains(*controller, gains);
     request.setpoint.tip_pose =
         carried(request.setpoint.tip_pose, request.attachment.tool, wanted.tool);
     request.setpoint.gains = gains;

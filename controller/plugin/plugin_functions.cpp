@@ -20,7 +20,7 @@ using namespace dashpot::controller;  // NOLINT(google-build-using-namespace): t
 namespace {
 
 // In storage of fixed size: nothing to allocate, nothing to destroy when a thread ends.
-thread_local std::array<char, 1024> last_error{};
+thread_local std::array<char, 2048> last_error{};
 
 std::int32_t refuse(const SetpointFault& fault) noexcept {
   std::array<char, 128> text{};
@@ -42,7 +42,9 @@ std::int32_t finish(std::int32_t code) noexcept {
 }
 
 std::int32_t warn(const char* text) noexcept {
-  std::snprintf(last_error.data(), last_error.size(), "%s", text);
+  const std::size_t length = std::strlen(last_error.data());
+  std::snprintf(last_error.data() + length, last_error.size() - length, "%s%s",
+                length == 0 ? "" : "; ", text);
   return DASHPOT_OK;
 }
 

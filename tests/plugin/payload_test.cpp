@@ -12,6 +12,7 @@
 namespace dashpot::tests {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 dashpot_payload payload(double mass, const double* tool_position = nullptr) {
@@ -202,13 +203,23 @@ TEST(PluginPayload, IsTakenWithAWarningIfItIsBetterThanWhatIs) {
   margin(folded, 1.02 * low);
   EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_UNSTABLE_GAINS);
   margin(folded, 0.98 * low);
+  std::array<double, 36> task_stiffness{}, task_damping{};
+  for (std::size_t i = 0; i < 6; ++i) {
+    task_stiffness[7 * i] = i < 3 ? 400 : 20;
+    task_damping[7 * i] = 0.7;
+  }
+  gains.task_stiffness = task_stiffness.data();
+  gains.task_damping = task_damping.data();
   EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK) << plugin().last_error();
   EXPECT_THAT(plugin().last_error(),
-              HasSubstr("limits.gain_margin asks for 2; taken because it was"));
+              AllOf(HasSubstr("limits.gain_margin asks for 2; taken because it was"),
+                    HasSubstr("; task damping: 0.7 is little beside")));
   dashpot_payload body = payload(0.5);
   body.center[0] = 0.3;
+  body.gains = &gains;
   EXPECT_EQ(plugin().set_payload(arm, &body), DASHPOT_OK) << plugin().last_error();
-  EXPECT_THAT(plugin().last_error(), HasSubstr("taken because it was"));
+  EXPECT_THAT(plugin().last_error(),
+              AllOf(HasSubstr("taken because it was"), HasSubstr("; task damping: 0.7 is little")));
   const dashpot_payload nothing = payload(0);
   EXPECT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_UNSTABLE_GAINS);
 }
