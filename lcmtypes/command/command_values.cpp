@@ -49,7 +49,7 @@ Verdict judge_entries(std::string& why, const char* name, const Eigen::MatrixBas
                       double least, double most) {
   if (!values.allFinite()) return Verdict::kNotFinite;
   for (const double value : values.reshaped()) {
-    if (value < least || value > most) return beyond(why, name, value, least, most);
+    if (!(value >= least && value <= most)) return beyond(why, name, value, least, most);
   }
   return Verdict::kAccepted;
 }
@@ -171,7 +171,11 @@ Verdict copy_ratio(std::string& why, const char* name, bool given, double value,
   if (!given) return Verdict::kAccepted;
   if (!std::isfinite(value)) return Verdict::kNotFinite;
   if (value > 0 && value <= most) return Verdict::kAccepted;
-  return beyond(why, name, value, 0, most, value > most && value <= 100 * most ? "%" : "");
+  if (value > 0) return beyond(why, name, value, 0, most, value <= 100 * most ? "%" : "");
+  std::ostringstream text;
+  text << name << " is " << value << ", it has to be above 0";
+  if (why.empty()) why = text.str();
+  return Verdict::kOutOfLimits;
 }
 
 /// That a body can have this inertia is for the controller to judge.
@@ -254,6 +258,7 @@ CommandVerdict copy_values(const command_t& message, const CommandLimits& limits
   judge(command_t::TIP_SPEED,
         [&] { return copy_tip_speed(message, limits, command.tip_speed, why); });
   judge(command_t::NULL_GAINS, [&] { return copy_null_gains(message, limits, gains, why); });
+  if (verdict != Verdict::kOutOfLimits) why.clear();  // it is about a number after the first fault
   command.parts |= message.parts;
   ++command.accepted;
   for (std::size_t bit = 0; bit < command.set_by.size(); ++bit) {

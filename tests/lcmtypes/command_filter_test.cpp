@@ -206,6 +206,8 @@ const std::vector<Fault> kFaults = {
     {V::kNotFinite, "null stiffness NaN", [](M& m) { m.null_stiffness[2] = kNaN; }},
     {V::kNotFinite, "null damping NaN", [](M& m) { m.null_damping[2] = kNaN; }},
     {V::kNotFinite, "ratio NaN", [](M& m) { m.task_damping_ratio = kNaN; }},
+    {V::kNotFinite, "wrench infinite and too large",
+     [](M& m) { m.wrench[0] = kInfinity, m.wrench[3] = 51; }},
     {V::kNotFinite, "payload NaN", [](M& m) { m.payload_inertia[0][2] = kNaN; }},
     {V::kNotFinite, "mass NaN", [](M& m) { m.payload_mass = kNaN; }},
     {V::kNotFinite, "tool NaN", [](M& m) { m.tool_position[2] = kNaN; }},
@@ -277,8 +279,11 @@ TEST(CommandFilter, NamesEachFaultAndKeepsTheLastGoodCommand) {
     EXPECT_EQ(filter.tally().last_refusal_utime, kNow + later);
     EXPECT_EQ(filter.tally().last_refused_sender, bad.sender);
     EXPECT_TRUE(filter.last_reason().starts_with(to_text(fault.verdict)));
-    const bool number = filter.last_reason().find(" is ") != std::string::npos &&
-                        filter.last_reason().find(", the limits are ") != std::string::npos;
+    const std::string ratio = " is 0, it has to be above 0", limits = ", the limits are ";
+    const bool number =
+        filter.last_reason().find(" is ") != std::string::npos &&
+        filter.last_reason().find(fault.name == std::string("ratio zero") ? ratio : limits) !=
+            std::string::npos;
     EXPECT_EQ(number, fault.verdict == Verdict::kOutOfLimits) << filter.last_reason();
     EXPECT_EQ(filter.command().sequence, good.sequence);
     EXPECT_EQ(filter.command().utime, good.utime);
@@ -286,6 +291,14 @@ TEST(CommandFilter, NamesEachFaultAndKeepsTheLastGoodCommand) {
     EXPECT_EQ(filter.command().setpoint.joint_position[0], good.joint_position[0]);
     EXPECT_EQ(judge(filter, sound, later), Verdict::kAccepted);  // only the fault was in the way
   }
+}
+
+TEST(CommandFilter, AcceptsNothingWhereItsLimitsAreNaN) {
+  Random random(925);
+  CommandLimits limits = limits_for(7);
+  limits.force = kNaN;
+  CommandFilter filter(limits);
+  EXPECT_EQ(judge(filter, random_command(random, 7)), Verdict::kOutOfLimits);
 }
 
 TEST_F(CommandFilters, RefusesAnotherNumberOfJoints) {
