@@ -51,6 +51,9 @@ struct ModelCheck {
   /// The gravity with which whole torques fit, in the axes of the root link, m/s^2, where it is
   /// another than the description's; the other results are those with it.
   std::optional<Eigen::Vector3d> gravity;
+  /// Whether little is left over with it. Otherwise the arm may hang at an angle in between, as
+  /// only the directions of the axes are tried.
+  bool gravity_fits = false;
   std::vector<std::string> ambiguities;  ///< what the records cannot tell apart
   std::vector<LeftOut> contacts;         ///< where other forces acted
   double used = 0;                       ///< s of motion

@@ -89,6 +89,11 @@ void write_config(const CheckModelOptions& options, const Config& config,
   if (!check.order.empty()) {
     throw InputError("--write", "nothing is written, because " + check.order.front());
   }
+  if (check.gravity && !check.gravity_fits) {
+    throw InputError("--write",
+                     "nothing is written, because of the directions that were tried no "
+                     "robot.gravity fits: how is the base inclined?");
+  }
   bool kept = true;
   const std::string text = changed_config(controller::read_regular_file(options.config),
                                           changes_for(options, config, check), kept);

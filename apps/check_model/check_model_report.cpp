@@ -104,8 +104,11 @@ std::string check_model_table(const CheckModelReport& report) {
     const Eigen::Vector3d& g = *check.gravity;
     const std::string list =
         format_number(g[0], 3) + ", " + format_number(g[1], 3) + ", " + format_number(g[2], 3);
-    doubts = "  gravity: the torques are those of an arm with robot.gravity: [" + list +
-             "], not as the model says: does it hang from a ceiling, or at a wall?\n";
+    doubts = "  gravity: the torques are " +
+             std::string(check.gravity_fits ? "those" : "nearer to those") +
+             " of an arm with robot.gravity: [" + list + "], not as the model says: " +
+             (check.gravity_fits ? "does it hang from a ceiling, or at a wall?\n"
+                                 : "is its base inclined, or the model wrong otherwise?\n");
   }
   for (const std::string& one : check.order) doubts += "  " + one + "\n";
   for (std::size_t i = 0; i < check.joints.size(); ++i) {
@@ -173,6 +176,7 @@ Json check_model_json(const CheckModelReport& report) {
           {"suspicious", std::move(suspicious)},
           {"order", check.order},
           {"gravity", check.gravity ? Json(json_list(*check.gravity)) : Json()},
+          {"gravity_fits", check.gravity_fits},
           {"ambiguities", check.ambiguities},
           {"left_out", std::move(left_out)},
           {"notes", report.notes}};

@@ -513,19 +513,22 @@ ModelCheck check_model(const RobotDescription& robot, const std::vector<TorqueRe
   if (check.kind != TorqueKind::kWhole || fitting.most_left() > kMuchLeft) {
     RobotDescription hung = robot;  // from a ceiling, or at a wall
     double least = best - kFarBetter;
+    bool fits = false;
     for (int k = 0; k < 6; ++k) {
       RobotDescription other = robot;
       other.options.gravity =
           (k < 3 ? 1 : -1) * robot.options.gravity.norm() * Eigen::Vector3d::Unit(k % 3) +
           Eigen::Vector3d::Zero();  // no zero with a sign
       const RobotModel hanging = other.model();
-      const double score = Fitting(hanging, runs, how, form).fit(TorqueKind::kWhole);
-      if (score < least) least = score, hung = other;
+      Fitting there(hanging, runs, how, form);
+      const double score = there.fit(TorqueKind::kWhole);
+      if (score < least) least = score, hung = other, fits = there.most_left() <= kMuchLeft;
     }
     if (least < best - kFarBetter) {
       ModelCheck there = check_model(hung, records);
       if (there.kind == TorqueKind::kWhole && there.order.empty()) {
         there.gravity = hung.options.gravity;
+        there.gravity_fits = fits;
         return there;
       }
     }

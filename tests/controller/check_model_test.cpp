@@ -217,9 +217,14 @@ TEST(CheckModel, TellsHowAnArmHangs) {
     const ModelCheck check = check_model(panda(), {arm.record(4)});
     ASSERT_TRUE(check.gravity);
     EXPECT_EQ(*check.gravity, gravity);
+    EXPECT_TRUE(check.gravity_fits);
     expect_loaded_panda(check, 0.02, 0.004);
     expect_no_doubt(check);
   }
+  arm.description.options.gravity = 9.81 * Eigen::Vector3d(0, 0.5, std::sqrt(0.75));
+  const ModelCheck inclined = check_model(panda(), {arm.record(4)});
+  ASSERT_TRUE(inclined.gravity);
+  EXPECT_FALSE(inclined.gravity_fits);
 }
 
 TEST(CheckModel, NamesExchangedColumnsAndWrongSigns) {
