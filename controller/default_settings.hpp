@@ -24,4 +24,7 @@ namespace dashpot::controller {
 /// at 1.5 Hz, and in the null space half of them.
 Settings default_settings(const RobotModel& model);
 
+/// Whether it is an arm, of four joints or more, none of which has a limit of effort.
+bool lacks_efforts(const RobotModel& model);
+
 }  // namespace dashpot::controller

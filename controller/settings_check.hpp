@@ -31,11 +31,14 @@ void validate(const Settings& settings, const RobotModel& model);
 /// Lines that ask about gains: whether the rotations of the task's stiffness or damping stand
 /// first, where a tip on a lever of twice the arm's reach would turn harder than it moves, and
 /// whether a damping is ratios, where no number is above 2 and the largest, at the tip against
-/// translation, leaves a mass or an inertia of 1 a ratio below 0.1. Joints with less than 100 N
-/// m/rad are not asked about.
+/// translation, leaves a mass or an inertia of 1 a ratio below 0.1. Joints that turn with
+/// less than 100 N m/rad are not asked about.
 std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains);
-/// The same of an arm of which only the reach is known, m.
-std::vector<std::string> doubtful_gains(double reach, const Gains& gains);
+/// The same of an arm of which the reach is known, m; without `joints` all are taken to turn.
+std::vector<std::string> doubtful_gains(double reach, const Gains& gains,
+                                        const std::vector<Joint>& joints = {});
+/// The one of these lines that asks whether a task's stiffness is in N/mm; empty: there is none.
+std::string soft_stiffness(const Gains& gains);
 
 /// How the brake stops an arm that is as its model: each joint alone from 0.9 of its velocity
 /// limit, with the mass matrix and weight of one posture, rigid gears, and no friction.

@@ -38,6 +38,11 @@ nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
   }
   const std::string heavy = controller::too_heavy(arm.model(), q);
   if (!heavy.empty()) result.push_back(refusal_json("q", heavy));
+  if (arm.torque_guessed()) {
+    result.push_back(refusal_json("limits.torque",
+                                  "the model has no effort limits; this page takes 100 N m, a "
+                                  "configuration has to say what each joint gives"));
+  }
   const controller::Gains& gains = design.settings.initial.gains;
   const bool null_space = !gains.null_stiffness.isZero(0) || !gains.null_damping.isZero(0);
   if (design.stated.kinematic_null_space && null_space) {

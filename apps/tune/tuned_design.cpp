@@ -178,8 +178,9 @@ TunedArm::TunedArm(controller::RobotDescription robot, const controller::Setting
     : robot_(with_text(std::move(robot))),
       model_(robot_.model()),
       settings_(settings != nullptr ? *settings : controller::default_settings(model_)),
-      own_settings_(settings != nullptr) {
-  if (!own_settings_ && settings_.limits.torque.isZero(0)) settings_.limits.torque.setConstant(100);
+      own_settings_(settings != nullptr),
+      torque_guessed_(!own_settings_ && settings_.limits.torque.isZero(0)) {
+  if (torque_guessed_) settings_.limits.torque.setConstant(100);
 }
 
 TunedArm TunedArm::with(const TuneJson& parts) const {

@@ -19,6 +19,8 @@ class TunedArm {
   /// Returns the model and the settings as given.
   const controller::RobotModel& model() const { return model_; }
   const controller::Settings& settings() const { return settings_; }
+  /// Whether nobody has said what the joints give: the settings have 100 N m, to calculate with.
+  bool torque_guessed() const { return torque_guessed_; }
 
   /// Makes another arm of {"payload": {"mass", "center", "inertia"}, "reflected_inertia",
   /// "viscous_friction", "gear_stiffness", "gear_damping": n each, "position_sensor"}; a key that
@@ -30,7 +32,7 @@ class TunedArm {
   controller::RobotDescription robot_;
   controller::RobotModel model_;
   controller::Settings settings_;
-  bool own_settings_;
+  bool own_settings_, torque_guessed_;
 };
 
 /// Gains on an arm in a loop, as the page tells them.

@@ -25,6 +25,11 @@ constexpr double kFastestDecay = 200;
 
 }  // namespace
 
+bool lacks_efforts(const RobotModel& model) {
+  constexpr int kArm = 4;  // joints that make an arm: of a rig of fewer 100 N m will do
+  return model.dof() >= kArm && model.joint_values(&Joint::effort).minCoeff() == kUnlimited;
+}
+
 Settings default_settings(const RobotModel& model) {
   const int n = model.dof();
   const JointVector none = JointVector::Zero(n);
@@ -48,10 +53,8 @@ Settings default_settings(const RobotModel& model) {
     middle[i] = std::isfinite(center) ? center : 0;
   }
   settings.integral.torque = limits.torque / 10;
-  constexpr int kArm = 4;  // joints that make an arm: of a rig of fewer 100 N m will do
-  if (n >= kArm && model.joint_values(&Joint::effort).minCoeff() == kUnlimited) {
-    limits.torque.setZero();  // `validate` refuses it: nobody has said what the joints give
-  }
+  // `validate` refuses it: nobody has said what the joints give
+  if (lacks_efforts(model)) limits.torque.setZero();
   settings.motion.velocity = 0.25 * limits.velocity;
   settings.motion.acceleration = limits.velocity;
   for (int i = 0; i < n; ++i) {  // it brakes at half of this, and changes it within the smoothing

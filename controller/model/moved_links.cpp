@@ -1,4 +1,5 @@
 #include <dashpot/controller/attachment.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
@@ -164,12 +165,20 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
   const auto limit = [&](const Joint& joint, double value, double most, const std::string& what) {
     if (value > most && value < kNoLimit) doubt(joint, "limit of " + what);
   };
-  const double least = model.joint_values(&Joint::effort).minCoeff();
-  if (model.dof() >= kArm && least == std::numeric_limits<double>::infinity()) {
+  if (lacks_efforts(model)) {
     warnings.emplace_back(
         "joints: none has a limit of effort (0 is none): whether they hold the arm is not known, "
         "and "
         "a controller needs limits.torque");
+  } else if (model.dof() >= kArm) {
+    std::string names;
+    for (const Joint& joint : model.joints()) {
+      if (std::isinf(joint.effort)) names += (names.empty() ? "" : ", ") + joint.name;
+    }
+    if (!names.empty()) {
+      warnings.push_back(one_line("joints without a limit of effort (0 is none): " + names +
+                                  ": a controller takes 100 N m where limits.torque says nothing"));
+    }
   }
   const bool bare =
       mass > kHeavy && model.joint_values(&Joint::reflected_inertia).maxCoeff() < kBare;

@@ -1,4 +1,5 @@
 #include <dashpot/controller/base/settings_table.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
 #include <dashpot/controller/model/moved_links.hpp>
 #include <dashpot/controller/safety/brake.hpp>
@@ -228,13 +229,20 @@ std::string little_damping(const std::string& of, const std::string& unit,
 
 }  // namespace
 
-std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains) {
-  return doubtful_gains(reach_of(kdl_chain(model), model.joints()), gains);
+std::string soft_stiffness(const Gains& gains) {
+  constexpr double kSoft = 5;  // N/m
+  const double k = gains.task_stiffness.diagonal().head<3>().maxCoeff();
+  if (!(k > 0 && k < kSoft)) return "";
+  return "task stiffness: " + number(k) + " N/m hardly holds a tip: is it in N/mm?";
 }
 
-std::vector<std::string> doubtful_gains(double reach, const Gains& gains) {
+std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains) {
+  return doubtful_gains(reach_of(kdl_chain(model), model.joints()), gains, model.joints());
+}
+
+std::vector<std::string> doubtful_gains(double reach, const Gains& gains,
+                                        const std::vector<Joint>& joints) {
   constexpr double kFirm = 100;  // N m/rad: joints of less may move little enough
-  constexpr double kSoft = 5;    // N/m
   const Vector6 K = gains.task_stiffness.diagonal(), D = gains.task_damping.diagonal();
   const bool damped = gains.task_damping_ratio == 0;
   std::vector<std::string> said;
@@ -246,15 +254,23 @@ std::vector<std::string> doubtful_gains(double reach, const Gains& gains) {
                    " m/rad against rotation is much beside " + number(move) + " " + of +
                    "/m against translation, which stands first: is the order another?");
   }
-  if (const double k = K.head<3>().maxCoeff(); k > 0 && k < kSoft) {
-    said.push_back("task stiffness: " + number(k) + " N/m hardly holds a tip: is it in N/mm?");
-  }
+  said.push_back(soft_stiffness(gains));
   if (damped && gains.task_damping.isDiagonal(0)) {
     said.push_back(little_damping("task", "N/m", K.head(3), D));
   }
-  const JointVector k = gains.joint_stiffness.diagonal();
-  if (k.size() > 0 && gains.joint_damping_ratio == 0 && k.maxCoeff() >= kFirm) {
-    said.push_back(little_damping("joint", "N m/rad", k, gains.joint_damping.diagonal()));
+  for (const bool slides : {false, true}) {
+    std::vector<double> k, d;
+    const Eigen::Index n = gains.joint_damping_ratio == 0 ? gains.joint_stiffness.rows() : 0;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto j = static_cast<std::size_t>(i);
+      if ((j < joints.size() && joints[j].type == JointType::kPrismatic) != slides) continue;
+      k.push_back(gains.joint_stiffness(i, i));
+      d.push_back(gains.joint_damping(i, i));
+    }
+    const auto size = static_cast<Eigen::Index>(k.size());
+    const Eigen::Map<const Eigen::VectorXd> stiffness(k.data(), size), damping(d.data(), size);
+    if (size == 0 || (!slides && stiffness.maxCoeff() < kFirm)) continue;
+    said.push_back(little_damping("joint", slides ? "N/m" : "N m/rad", stiffness, damping));
   }
   std::erase(said, "");
   return said;
@@ -262,7 +278,8 @@ std::vector<std::string> doubtful_gains(double reach, const Gains& gains) {
 
 void validate(const Settings& settings, const RobotModel& model) {
   const int n = model.dof();
-  if (n > 0 && settings.limits.torque.size() == n && settings.limits.torque.isZero(0)) {
+  const JointVector& torque = settings.limits.torque;
+  if (torque.size() == n && torque.isZero(0) && lacks_efforts(model)) {
     throw InvalidSettings("limits.torque",
                           "missing: no joint of the model has a limit of effort (0 is none); "
                           "write what each joint gives, N m");

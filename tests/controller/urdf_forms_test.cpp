@@ -150,6 +150,12 @@ TEST(UrdfForms, WantTorquesWhereNoneIsStated) {
               ThrowsMessage<InvalidSettings>(HasSubstr("limits.torque: missing: no joint of the")));
   settings.limits.torque.setConstant(7, 80);
   EXPECT_NO_THROW((void)Controller(model, settings));
+  // Where some state one, the others are named, and zeros are no torques that are missing.
+  const RobotModel other = read_panda(panda_with("effort=\"87\"", "effort=\"0\""));
+  EXPECT_THAT(other.warnings(), Contains(HasSubstr("(0 is none): panda_joint1: a controller")));
+  settings.limits.torque.setZero();
+  EXPECT_THAT([&] { (void)Controller(other, settings); },
+              ThrowsMessage<InvalidSettings>(Not(HasSubstr("missing"))));
 }
 
 TEST(UrdfForms, MayHoldInertiasThatCannotMatter) {

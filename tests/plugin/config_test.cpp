@@ -2,6 +2,7 @@
 #include <dashpot/controller/base/settings_table.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/tests/plugin/config_file.hpp>
 #include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/special_values.hpp>
@@ -422,15 +423,19 @@ TEST(Config, KnowsPrismaticJoints) {
   const Scratch scratch;
   scratch.write("slide.urdf", urdf);
   const std::string head = "robot: {urdf: slide.urdf, base: rail, tip: cart}\n";
-  const Settings settings =
-      controller::load_config(
-          scratch.write("arm.yaml", head +
-                                        "gains: {joint: {stiffness: 500 N/m, damping: 3 N s/m}}\n"
-                                        "limits: {torque: 40 N, position_upper: 50 cm}\n"))
-          .settings;
+  const Config config = controller::load_config(
+      scratch.write("arm.yaml", head + "gains: {joint: {stiffness: 500 N/m, damping: 3 N s/m}}\n"
+                                       "limits: {torque: 40 N, position_upper: 50 cm}\n"));
+  const Settings& settings = config.settings;
   EXPECT_EQ(settings.initial.gains.joint_stiffness(0, 0), 500);
   EXPECT_EQ(settings.limits.torque[0], 40);
   EXPECT_EQ(settings.limits.position_upper[0], 0.5);
+  controller::Gains doubtful = settings.initial.gains;
+  doubtful.joint_stiffness.setConstant(1, 1, 50);
+  doubtful.joint_damping.setConstant(1, 1, 0.7);
+  EXPECT_THAT(controller::doubtful_gains(config.model, doubtful),
+              ::testing::ElementsAre(
+                  ::testing::HasSubstr("beside a stiffness of 50 N/m: is it a damping ratio")));
   const std::string wrong = scratch.write("wrong.yaml", head + "limits: {torque: 40 Nm}\n");
   EXPECT_EQ(load_refusal(wrong),
             wrong + ": limits.torque: has a wrong unit: '40 Nm'; N is wanted (line 2)");

@@ -341,6 +341,7 @@ class TuneServer(unittest.TestCase):
                 said = [line.removeprefix('warning: ') for line in done.stderr.splitlines()]
                 warned = server.design(self.base | {'stiffness': stiffness, 'damping': damping})['warned']
                 self.assertEqual(([one['reason'] for one in warned], len(warned)), (said, questions))
+            self.assertIn('limits.torque', [one['key'] for one in server.design(self.base)['refused']])
 
     def test_refuses_hostile_requests(self):
         post, token = self.server.post, self.server.setup['token']
