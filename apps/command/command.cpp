@@ -208,8 +208,11 @@ void doubt(const command_t& command, const state_t& state) {
   constexpr const char* kAnyway = "; --anyway sends it";
   const double reach = Eigen::Map<const Eigen::Vector3d>(state.tip_position).norm();
   const controller::Gains gains = judged(command).command().setpoint.gains;
+  const std::string soft = controller::soft_stiffness(gains);
   for (const std::string& said : controller::doubtful_gains(std::max(1.0, reach), gains)) {
-    throw InputError("", said + kAnyway);
+    // To soften is the safe direction, and perhaps urgent.
+    if (said != soft) throw InputError("", said + kAnyway);
+    print_error("warning: " + said);
   }
   if ((command.parts & command_t::TIP_POSE) == 0) return;
   constexpr double kFar = 1, kShare = 0.25;  // rad; of the turn
@@ -343,7 +346,8 @@ void add_command(CLI::App& program) {
   add("--payload", &CommandOptions::payload,
       "What the arm carries: mass, and center in the tip's axes; kg, m", "m[,x,y,z]");
   command->add_flag("--release", options->release, "Release the latched fault");
-  command->add_flag("--anyway", options->anyway, "Send what looks like another unit or order");
+  command->add_flag("--anyway", options->anyway,
+                    "Send what looks like another order, or like a ratio in place of a damping");
   add("--lcm-url", &CommandOptions::url,
       "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine", "URL");
   command->add_option("--timeout", options->timeout, "For a state, and for the answer, s")

@@ -76,6 +76,9 @@ TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
       command(live, {"--stiffness", "20,20,20,200,200,200", "--damping-ratio", "0.7", "--anyway"})
           .out,
       "accepted\n");
+  const Outcome soft = command(live, {"--stiffness", "3,3,3,1,1,1", "--damping-ratio", "0.7"});
+  EXPECT_EQ(soft.out, "accepted\n") << soft.err;
+  EXPECT_THAT(soft.err, HasSubstr("warning: task stiffness: 3 N/m hardly holds a tip"));
   expect_refusal(command(live, {"--release"}), "--release: no fault is latched");
   expect_refusal(command(live, {}), "says nothing");
   expect_refusal(command(live, {"--stiffness", "1,1,1,1,1,1"}),
