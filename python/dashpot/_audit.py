@@ -188,7 +188,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     if not at_tip and not (task_stiffness is None and task_damping is None):
         raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
     factor_of = (damping_factor, None) if at_tip else (None, damping_factor)
-    if delay != int(delay):
+    if not float(delay).is_integer():
         raise Error(f"delay: {delay} is no whole number of ticks; is it in s?")
     chosen = selected(directions)
     stiffness = to_gain("task_stiffness", task_stiffness)

@@ -8,6 +8,7 @@ import json
 import math
 import numbers
 import os
+import re
 import warnings
 from collections.abc import Mapping
 from typing import Any, Sequence
@@ -278,6 +279,7 @@ class Controller:
         """n."""
         self.joint_names: tuple[str, ...] = tuple(self._core.joint_names())
         """n, from the base to the tip."""
+        self._warned: set[str] = set()  # of what set_gains has, without its numbers
         self.period: float = self._core.period
         """Of the loop, s."""
 
@@ -344,10 +346,15 @@ class Controller:
                   directions: Sequence[str] | None = None) -> None:
         """Sets gains that the next tick takes up; None keeps one as it is. Matrices (n x n, 6 x 6)
         may be given as their diagonals, null_stiffness and null_damping have n entries. Raises Error
-        for gains that are not possible, or leave the sampled loop too small a gain margin. Warns of
-        ones that are taken with too small a margin because it was smaller before."""
+        for gains that are not possible, or leave the sampled loop too small a gain margin. Warns,
+        once of each, of ones that are taken with too small a margin because it was smaller before,
+        and of ones that look like another unit or order."""
         given = {key: value for key, value in locals().items() if key != "self"}
-        _warn(self._core.set_gains(_gains(given)))
+        text = self._core.set_gains(_gains(given))
+        kind = re.sub(r"\d[\d.e+-]*", "#", text)
+        if kind not in self._warned:
+            self._warned.add(kind)
+            _warn(text)
 
     def set_payload(self, mass: float, center: npt.ArrayLike = (0, 0, 0),
                     inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)), *,

@@ -3,6 +3,7 @@
 import json
 import pickle
 import subprocess
+import warnings
 
 import numpy as np
 import pytest
@@ -167,6 +168,9 @@ def test_degrees_percent_and_transposed_tools_are_told(panda, config):
     controller.start(HOME)
     with pytest.warns(UserWarning, match="is it a damping ratio"):
         controller.set_gains(task_stiffness=[400] * 3 + [20] * 3, task_damping=[0.7] * 6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # it has been asked
+        controller.set_gains(task_stiffness=[400] * 3 + [20] * 3, task_damping=[0.8] * 6)
 
 
 def test_a_closed_loop_that_cannot_be_is_refused(panda):
