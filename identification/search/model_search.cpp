@@ -96,12 +96,12 @@ std::vector<MotionRecord> strongest(const std::vector<MotionRecord>& records,
 /// of all of them where it moves in none alone.
 VectorXd usual_noise(const std::vector<MotionRecord>& all, const VectorXd& noise,
                      const VectorXd& motion) {
-  constexpr double kMoves = 1e-9;  // less than this of the motion are digits of a channel at rest
+  constexpr double kAtRest = 1e-9;  // less than this of the motion are digits of a channel at rest
   VectorXd sum = VectorXd::Zero(noise.size()), count = sum;
   for (const MotionRecord& record : all) {
     const VectorXd alone = first_noise({record});
     for (Index c = 0; c < alone.size(); ++c) {
-      if (alone[c] > kMoves * motion[c]) sum[c] += std::log(alone[c]), ++count[c];
+      if (alone[c] > kAtRest * motion[c]) sum[c] += std::log(alone[c]), ++count[c];
     }
   }
   const VectorXd mean = sum.cwiseQuotient(count.cwiseMax(1)).array().exp();
