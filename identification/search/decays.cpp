@@ -151,7 +151,7 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   result.order = static_cast<int>(at);
   // Friction makes of one mode others near it, heavily damped ones, and weak ones.
   constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2, kMuch = 0.1, kOfRest = 0.3,
-                   kPoor = 0.01, kRounds = 1.2;
+                   kPoor = 0.01, kLittle = 1e-3, kRounds = 1.2;
   double most = 0;
   for (const MeasuredMode& mode : modes) {
     if (mode.damping_ratio < kLightly) most = std::max(most, mode.energy);
@@ -159,7 +159,7 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   // Of driven motion the noise of inputs is left over, too.
   // Rounding is no noise, either, but of a known size.
   const bool rounded = (search.fit.noise.array() <= kRounds * search.data.rounding.array()).all();
-  const double unexplained = rounded ? 0 : 1 - result.explained;
+  const double unexplained = 1 - result.explained;
   const bool coloured = search.fit.whiteness > kFarFromWhite;
   const bool doubted = coloured && !rounded && (search.data.inputs == 0 || unexplained > kMuch);
   for (MeasuredMode& mode : modes) {
@@ -167,11 +167,14 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
       mode.reason = "much weaker than what is left over";
     } else if (mode.stability == 0 && mode.energy < unexplained) {
       mode.reason = "weaker than what is left over, and in no model of another order";
-    } else if (mode.stability == 0 && (unexplained > kPoor || (rounded && coloured))) {
+    } else if (mode.stability == 0 && (rounded ? coloured : unexplained > kPoor)) {
       mode.reason = rounded ? "in no model of another order, and the sensors' steps are left over"
                             : "in no model of another order, and much is left over";
     }
-    if (doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
+    // Several records that agree, of which hardly anything is left over, have it.
+    const bool agreed =
+        search.data.records > 1 && !search.differs && mode.stability > 0 && unexplained < kLittle;
+    if (doubted && !agreed && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
       mode.reason = std::string(search.differs        ? "parts of the records differ"
                                 : unexplained > kMuch ? "much is left over"
                                                       : "what is left over is no noise") +

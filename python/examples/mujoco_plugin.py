@@ -5,6 +5,7 @@ python python/examples/mujoco_plugin.py ARM.xml CONFIG.yaml [LIBRARY]
 
 import pathlib
 import sys
+import time
 
 import mujoco
 import numpy as np
@@ -39,6 +40,9 @@ def main(arm, config, library="build/release/libdashpot_mujoco.so"):
     while data.time < 1:
         mujoco.mj_step(model, data)
     print(f"after 1 s the arm is {np.abs(data.qpos - start).max():.1g} rad from where it began")
+    until = time.monotonic() + 10  # the analysis has a thread of its own
+    while data.sensor("modes").data[3] == 0 and time.monotonic() < until:
+        mujoco.mj_step(model, data)
     status, fault, margin, count = data.sensor("modes").data[:4]
     n = (model.sensor("modes").dim[0] - 4) // 2
     frequency, ratio = data.sensor("modes").data[4:].reshape(2, n)[:, :int(count)]

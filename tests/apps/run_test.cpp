@@ -49,7 +49,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          ::testing::Values("panda", "panda_release_c1", "panda_release_c2",
                                            "panda_release_ratio_damping", "panda_push_free",
                                            "panda_push_held", "panda_pick_up", "panda_late_torque",
-                                           "iiwa14", "ur5", "baxter_left", "chain3"));
+                                           "iiwa14", "iiwa14_knocks", "ur5", "baxter_left",
+                                           "chain3"));
 
 TEST(Scenes, AreAllTested) {
   std::size_t files = 0;
@@ -57,7 +58,7 @@ TEST(Scenes, AreAllTested) {
        std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes")) {
     files += entry.path().extension() == ".yaml" ? 1 : 0;
   }
-  EXPECT_EQ(files, 12U);  // those of EveryScene
+  EXPECT_EQ(files, 13U);  // those of EveryScene
 }
 
 /// Every key that the reader says it knows stands in the example.
