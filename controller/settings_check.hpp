@@ -34,7 +34,7 @@ void validate(const Settings& settings, const RobotModel& model);
 /// translation, leaves a mass or an inertia of 1 a ratio below 0.1. Joints that turn with
 /// less than 100 N m/rad are not asked about.
 std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains);
-/// The same of an arm of which the reach is known, m; without `joints` all are taken to turn.
+/// Asks the same about an arm of known reach, m; without `joints` all joints are taken to turn.
 std::vector<std::string> doubtful_gains(double reach, const Gains& gains,
                                         const std::vector<Joint>& joints = {});
 /// The one of these lines that asks whether a task's stiffness is in N/mm; empty: there is none.

@@ -38,6 +38,8 @@ struct MeasuredMode {
   double energy = 0;     ///< its share of the motion: of the squares of all channels, each in units
                          ///< of its own root mean square
   std::string reason;    ///< why it is rejected; empty if it is not
+  /// Rejected as one of many that make up for friction, contact, or what else is not linear.
+  bool not_linear = false;
 };
 
 /// An eigenvalue of a model of some order, for stabilisation tables and pictures.

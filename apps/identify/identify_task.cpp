@@ -28,14 +28,10 @@ constexpr const char* kNotLinear =
     "something: larger pushes, a measured excitation (--inputs), or check-model for the friction, "
     "tell more";
 
-/// Whether no more factors of the model are rejected as what friction makes than are believed.
+/// Whether no more modes are rejected as what is not linear than are believed.
 bool is_linear(const identification::Identification& found) {
-  const auto doubted = std::count_if(
-      found.rejected.begin(), found.rejected.end(), [](const identification::MeasuredMode& mode) {
-        return mode.reason.find("may be friction") != std::string::npos ||
-               mode.reason.find("half of this model") != std::string::npos ||
-               mode.reason.find("much is left over") != std::string::npos;
-      });
+  const auto doubted = std::count_if(found.rejected.begin(), found.rejected.end(),
+                                     [](const auto& mode) { return mode.not_linear; });
   return static_cast<std::size_t>(doubted) <= found.modes.size();
 }
 

@@ -168,6 +168,7 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
     } else if (mode.stability == 0 && mode.energy < unexplained) {
       mode.reason = "weaker than what is left over, and in no model of another order";
     } else if (mode.stability == 0 && (rounded ? coloured : unexplained > kPoor)) {
+      mode.not_linear = !rounded;
       mode.reason = rounded ? "in no model of another order, and the sensors' steps are left over"
                             : "in no model of another order, and much is left over";
     }
@@ -175,6 +176,7 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
     const bool agreed =
         search.data.records > 1 && !search.differs && mode.stability > 0 && unexplained < kLittle;
     if (doubted && !agreed && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
+      mode.not_linear = true;
       mode.reason = std::string(search.differs        ? "parts of the records differ"
                                 : unexplained > kMuch ? "much is left over"
                                                       : "what is left over is no noise") +

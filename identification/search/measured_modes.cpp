@@ -204,6 +204,7 @@ void judge(std::vector<MeasuredMode> modes, const Judgement& records, Identifica
   const bool coloured = result.whiteness > kWhite && result.rejected.size() > result.modes.size();
   if (records.decays ? !whole && 2 * stable <= result.modes.size() : coloured) {
     for (auto mode = alone; mode != result.modes.end(); ++mode) {
+      mode->not_linear = records.decays;
       mode->reason = records.decays
                          ? "in no model of another order, as half of this model or more"
                          : "in no model of another order, and most of this one is not believed";

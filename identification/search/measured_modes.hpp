@@ -23,10 +23,10 @@ std::vector<ModelPole> model_poles(const std::vector<std::vector<RealizedPole>>&
 double stability_of(const MeasuredMode& mode,
                     const std::vector<std::vector<RealizedPole>>& by_order, int order);
 
-/// What modes are judged by besides themselves.
+/// The records that modes are judged by.
 struct Judgement {
-  double duration = 0, step = 0;  ///< s, of the records
-  bool decays = false;            ///< free ones, in which a mode fades
+  double duration = 0, step = 0;  ///< s
+  bool decays = false;            ///< the motion is free, and modes fade
 };
 
 /// Makes overdamped modes of single eigenvalues of like shapes, and sorts out what is not to be

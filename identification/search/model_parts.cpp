@@ -1,4 +1,4 @@
-// Compares parts of the records with the model of the whole.
+// Compares parts of the records with the model of the whole, and says how sure that is.
 #include <dashpot/identification/search/model_search.hpp>
 
 #include <Eigen/SVD>
@@ -26,6 +26,22 @@ constexpr double kDeviations = 3;  ///< by which an estimate may be off by chanc
 constexpr double kVague = 0.05;
 /// and does not have a factor that differs by more, unless its deviation explains it.
 constexpr double kSame = 0.05, kSameRatio = 0.15;
+
+/// The geometric mean over the records in which a channel moves, as a fit's noise is one; `noise`
+/// of all of them where it moves in none alone.
+VectorXd usual_noise(const std::vector<MotionRecord>& all, const VectorXd& noise,
+                     const VectorXd& motion) {
+  constexpr double kAtRest = 1e-9;  // less than this of the motion are digits of a channel at rest
+  VectorXd sum = VectorXd::Zero(noise.size()), count = sum;
+  for (const MotionRecord& record : all) {
+    const VectorXd alone = first_noise({record});
+    for (Index c = 0; c < alone.size(); ++c) {
+      if (alone[c] > kAtRest * motion[c]) sum[c] += std::log(alone[c]), ++count[c];
+    }
+  }
+  const VectorXd mean = sum.cwiseQuotient(count.cwiseMax(1)).array().exp();
+  return (count.array() > 0).select(mean, noise);
+}
 
 }  // namespace
 
@@ -200,6 +216,20 @@ void ModelSearch::add_spread_of_orders() {
     }
     for (std::size_t i : {0U, 1U}) scatter[k][i] += count > 0 ? sum[i] / count : 0;
   }
+}
+
+/// Widens by the noise of the records themselves.
+void ModelSearch::widen(const std::vector<MotionRecord>& all, const VectorXd& noise) {
+  widen(usual_noise(all, noise, data.motion).cwiseMax(DecayData::kLinear * data.motion));
+}
+
+/// Widens the deviations by what the likelihood does not know: that an arm is not quite linear. One
+/// record of a decay does not show it, where several differ (measured on arms of another engine:
+/// docs/identify.md); and where more is left over than sensors make, it is in the way of all modes.
+void ModelSearch::widen(const VectorXd& sensors) {
+  constexpr double kAlone = 1.4;
+  const double rest = std::max(1.0, fit.noise.cwiseQuotient(sensors).maxCoeff());
+  fit.covariance *= rest * (data.sources() == 1 ? kAlone * kAlone : 1);
 }
 
 }  // namespace dashpot::identification

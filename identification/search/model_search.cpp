@@ -92,22 +92,6 @@ std::vector<MotionRecord> strongest(const std::vector<MotionRecord>& records,
   return chosen;
 }
 
-/// The geometric mean over the records in which a channel moves, as a fit's noise is one; `noise`
-/// of all of them where it moves in none alone.
-VectorXd usual_noise(const std::vector<MotionRecord>& all, const VectorXd& noise,
-                     const VectorXd& motion) {
-  constexpr double kAtRest = 1e-9;  // less than this of the motion are digits of a channel at rest
-  VectorXd sum = VectorXd::Zero(noise.size()), count = sum;
-  for (const MotionRecord& record : all) {
-    const VectorXd alone = first_noise({record});
-    for (Index c = 0; c < alone.size(); ++c) {
-      if (alone[c] > kAtRest * motion[c]) sum[c] += std::log(alone[c]), ++count[c];
-    }
-  }
-  const VectorXd mean = sum.cwiseQuotient(count.cwiseMax(1)).array().exp();
-  return (count.array() > 0).select(mean, noise);
-}
-
 }  // namespace
 
 ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOptions& options)
@@ -161,7 +145,7 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOpt
   if (larger) larger = fit_decays(data, larger->factors, fit.noise, 30);
   if (larger && larger->criterion < fit.criterion) fit = std::move(*larger), larger.reset();
   forget_useless_larger();
-  widen(usual_noise(all, noise, data.motion).cwiseMax(DecayData::kLinear * data.motion));
+  widen(all, noise);
 }
 
 ModelSearch::ModelSearch(const ExcitedCells& cells, const IdentifyOptions& options)
@@ -204,15 +188,6 @@ void ModelSearch::refine(const ExcitedCells& all) {
   fit = fit_decays(data, fit.factors, all.noise, iterations_);
   larger.reset();
   widen(all.noise);
-}
-
-/// Widens the deviations by what the likelihood does not know: that an arm is not quite linear. One
-/// record of a decay does not show it, where several differ (measured on arms of another engine:
-/// docs/identify.md); and where more is left over than sensors make, it is in the way of all modes.
-void ModelSearch::widen(const VectorXd& sensors) {
-  constexpr double kAlone = 1.4;
-  const double rest = std::max(1.0, fit.noise.cwiseQuotient(sensors).maxCoeff());
-  fit.covariance *= rest * (data.sources() == 1 ? kAlone * kAlone : 1);
 }
 
 /// Returns the criterion with a price of parameters that grows with the motion that no model

@@ -41,6 +41,7 @@ class ModelSearch {
   void try_products(const Eigen::VectorXd& noise);
   void forget_useless_larger();
   void widen(const Eigen::VectorXd& sensors);
+  void widen(const std::vector<MotionRecord>& all, const Eigen::VectorXd& noise);
   void try_drift();
   void keep_repeated();
   std::vector<DecayStep> steps_of_parts(const DecayFit& whole) const;

@@ -75,6 +75,26 @@ TEST(Identify, FindsModesOfAmbientMotion) {
   EXPECT_THAT(none.err, HasSubstr("no modes: motion under unknown forces"));
 }
 
+/// Seven modes of four decays as predicted; beside friction next to none, and the verdict says why.
+TEST(Identify, FindsInScenesWhatIsPredictedOrSaysThatTheyAreNotLinear) {
+  const Scratch scratch;
+  const auto found_in = [&](const std::string& name) {
+    const std::string file = scratch.path(name + ".lcm");
+    EXPECT_EQ(run_program({"run", scene(name), "--fast", "--log", file}).status, 0);
+    return identify({file, "--against", scene(name)});
+  };
+  const Json knocks = found_in("iiwa14_knocks");
+  ASSERT_EQ(knocks["modes"].size(), 7U) << knocks.dump();
+  EXPECT_TRUE(knocks["notes"].empty()) << knocks["notes"].dump();
+  ASSERT_EQ(knocks["difference"].size(), 7U);
+  for (const Json& one : knocks["difference"]) {
+    EXPECT_TRUE(one["within"].get<bool>());
+    EXPECT_LT(std::abs(one["natural_frequency"].get<double>()), 0.006);  // rad/s
+  }
+  const Json friction = found_in("ur5");
+  EXPECT_THAT(friction["notes"].dump(), HasSubstr("is no mode"));
+}
+
 TEST(Identify, SaysFirstWhatARecordShows) {
   DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;

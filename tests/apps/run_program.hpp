@@ -29,7 +29,7 @@ inline Words joined(Words first, const Words& second) {
   return first;
 }
 
-/// What printf prints.
+/// Returns the text that printf prints.
 [[gnu::format(printf, 1, 2)]] inline std::string printed(const char* format, ...) {
   std::array<char, 400> text{};
   va_list values;

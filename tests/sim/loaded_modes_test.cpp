@@ -164,7 +164,7 @@ struct Case {
   friend void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 };
 
-/// Of the modes that springs and dampers of the tip make, without a load.
+/// Frequencies, rad/s, and ratios of the modes that springs and dampers of the tip make, unloaded.
 const VectorXd kOmega{{12, 15, 19, 24, 30, 40}}, kZeta{{0.2, 0.5, 0.3, 0.6, 0.4, 0.25}};
 
 controller::Settings loaded_settings(const TwinModels& twin, const controller::Gains& gains,

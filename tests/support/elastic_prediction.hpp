@@ -37,7 +37,7 @@ inline std::ostream& operator<<(std::ostream& out, const ElasticDifference& seen
              << to_text(seen.status);
 }
 
-/// Those of several loops.
+/// The largest differences of several loops, and how many loops there were.
 struct ElasticDifferences {
   ElasticDifference worst;
   long loops = 0, bounded = 0, unstable = 0, links = 0;

@@ -105,8 +105,9 @@ inline bool to_forty_digits(const CertifiedEigenvalues& found) {
   return all;
 }
 
-/// Those of [0 W; -M^-1 W'  -M^-1 C] where there is a factor W (p x n): n - p zeros less. From the
-/// matrices, which serves at any scale; or from the polynomial, where eigenvalues coincide.
+/// Eigenvalues of [0 W; -M^-1 W'  -M^-1 C] where there is a factor W (p x n): n - p zeros less.
+/// They come from the matrices, which serves at any scale; or from the polynomial, where
+/// eigenvalues coincide.
 template <int N>
 std::vector<LongComplex> proved_eigenvalues(const analysis::System<N>& system) {
   for (const int bits : {128, 256, 512, 1024, 2048}) {

@@ -44,7 +44,7 @@ TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
     return live.modes.num_modes >= 6 && std::abs(live.modes.damping_ratio[0] - 0.9) < 0.05;
   })) << "fault "
       << int{live.state.fault} << ", mode " << int{live.state.mode};
-  // What the loop refuses is an error of the program's, with the number and its limits.
+  // A command that the loop refuses is an error of the program, with the number and its limits.
   for (const auto& [option, numbers, reason] :
        {std::tuple("--joint-position", "0,-0.8,0,-2.4,0,1.6,40",
                    "--joint-position is beyond limits.position_lower, _upper, or in deg without"),
@@ -57,7 +57,7 @@ TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
     EXPECT_THAT(far.err,
                 AllOf(HasSubstr("dashpot command: refused: out of limits: "), HasSubstr(reason)));
   }
-  // What is likely to be meant otherwise does not reach the loop.
+  // A command that is likely to be meant otherwise does not reach the loop.
   std::string last;
   for (const int i : {1, 2, 3, 0}) {
     last += (last.empty() ? "" : ",") + std::to_string(live.state.reference_tip_quaternion[i]);
