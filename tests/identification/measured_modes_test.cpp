@@ -184,6 +184,7 @@ TEST(MeasuredModes, AtTheSumOfTwoMuchLargerOnesAreNone) {
   EXPECT_THAT(at(a + a, 0.4), HasSubstr(text));
   EXPECT_THAT(at((a + b) * (1.0 + 0.0019 * up), 0.4), HasSubstr(text));
   EXPECT_EQ(at((a + b) * (1.0 + 0.0022 * up), 0.4), "");
+  EXPECT_THAT(at(a + b, 0.051), HasSubstr(text));
   EXPECT_EQ(at(a + b, 0.049), "");
   EXPECT_EQ(at(a + b, 101), "");  // which cancels, and is not known itself
 }
