@@ -9,19 +9,6 @@
 
 namespace dashpot::analysis {
 
-/// One system to be damped: the damping matrix X (k x k) that is sought acts through `map`,
-///     C = system.damping + map X map',
-/// so that map is J' (n x m) in task space and the identity in joint space.
-struct DampingSample {
-  System<> system;
-  Eigen::MatrixXd map;
-};
-
-/// Returns the system of `impedance` without its task damping, and its map. Joint damping counts as
-/// damping given already. Throws InvalidSystem as to_joint_space does, and for what a design cannot
-/// include: a jacobian_rate, or a jacobian without task stiffness.
-DampingSample damping_sample(const TaskImpedance& impedance);
-
 /// The ratios that a mode may have: at least `level` times its target and at most `ceiling`;
 /// without a ceiling exactly `level` times its target. Soft modes may have any ratio.
 struct RatioGoal {

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/linalg/cluster_separation.hpp>
+#include <dashpot/analysis/linalg/invariant_subspaces.hpp>
 #include <dashpot/analysis/spectrum/modal_basis.hpp>
 
 namespace dashpot::analysis {

@@ -13,10 +13,10 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       settings_(settings),
       state_check_(model, settings),
       kernel_(model),
-      course_(model, settings),
+      setpoints_(model, settings),
       faults_(model, settings),
       designed_(designed_damping(model, settings)),
-      guide_(model, settings),
+      generator_(model, settings),
       law_(model, settings.feed_forward),
       integral_(settings.integral, settings.period),
       filter_(settings, gears_stopping_time(model, settings, Brake(settings).stopping_time())),
@@ -38,8 +38,8 @@ void ControllerCore::reset(const JointVector& torque) noexcept {
     filter_.restart();
   }
   forget_springs();
-  course_.reset();
-  kernel_.attach(course_.attachment().now());
+  setpoints_.reset();
+  kernel_.attach(setpoints_.attachment().now());
   sensed_.any = false;
   sensed_.external_wrench.setZero();
   designed_.reset();
@@ -60,7 +60,7 @@ void ControllerCore::release() noexcept {
 
 void ControllerCore::forget_springs() noexcept {
   state_check_.trust_velocities();
-  course_.release();
+  setpoints_.release();
   integral_.reset();
   filter_.brake().firm();
   filter_.begin_anew();  // what was held fades evenly
@@ -73,7 +73,7 @@ void ControllerCore::limit_tip_speed(const TipSpeed& speed) noexcept {
   if (limit < settings_.limits.tip_velocity) {
     of_references.linear = std::min(speed.linear, kShareOfTipLimit * limit);
   }
-  guide_.limit_tip_speed(of_references);
+  generator_.limit_tip_speed(of_references);
   filter_.limit_tip_speed(limit);
   faults_.limit_tip_speed(limit);
 }
@@ -99,7 +99,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     return finish(input, torque);
   }
   sensed_.dt = sensed_.any ? std::max(settings_.period, age) : settings_.period;
-  if (sensed_.any) course_.age(sensed_.dt);
+  if (sensed_.any) setpoints_.age(sensed_.dt);
   if (sensed_.dt > longest_gap) filter_.brake().forget();
   sensed_.any = true;
   sensed_.time = state.time;
@@ -109,11 +109,11 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   if (wrench_known) sensed_.external_wrench = state.external_wrench;
 
   // Evaluate the robot there, with what it carries now.
-  if (!course_.attachment().still()) {
-    const Pose before = course_.attachment().now().tool;
-    course_.step_attachment();
-    kernel_.attach(course_.attachment().now());
-    guide_.carry(before, course_.attachment().now().tool);
+  if (!setpoints_.attachment().still()) {
+    const Pose before = setpoints_.attachment().now().tool;
+    setpoints_.step_attachment();
+    kernel_.attach(setpoints_.attachment().now());
+    generator_.carry(before, setpoints_.attachment().now().tool);
   }
   kernel_.evaluate(sensed_.q, sensed_.qd, sensed_.robot);
   if (settings_.feed_forward.gravity) sensed_.weight = sensed_.robot.gravity;
@@ -122,13 +122,13 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   // Take over the set-point.
   Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
   if (setpoint != nullptr) {
-    const Course::News news = course_.take(*setpoint, sensed_.time);
-    if (news == Course::News::kRefused) status = Status::kSetpointRejected;
-    if (in_force() && news >= Course::News::kGoal) {
-      guide_.set_goal(course_, news == Course::News::kGains, sensed_);
+    const SetpointHistory::News news = setpoints_.take(*setpoint, sensed_.time);
+    if (news == SetpointHistory::News::kRefused) status = Status::kSetpointRejected;
+    if (in_force() && news >= SetpointHistory::News::kGoal) {
+      generator_.set_goal(setpoints_, news == SetpointHistory::News::kGains, sensed_);
     }
   }
-  status = worse(status, course_.age_status());
+  status = worse(status, setpoints_.age_status());
 
   // Watch the motion.
   const bool odd_stamp = input == Status::kTimeBackward && state_check_.backward() <= longest_gap;
@@ -137,7 +137,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
   if (blind) seen = worse(seen, Status::kCollision);
   const bool brakes = aim_ != Aim::kSprings;
-  const bool still = guide_.still(course_.gains().now());
+  const bool still = generator_.still(setpoints_.gains().now());
   const bool latched = faults_.fault() != Status::kOk;
   status = worse(status, faults_.watch(seen, sensed_, still, brakes ? &filter_.brake() : nullptr));
   if (latched && faults_.fault() == Status::kOk) forget_springs();
@@ -147,18 +147,19 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   const SmallCholesky* factor = nullptr;  // of M, where somebody has it
   if (status < Status::kSetpointLost) {
     if (aim_ != Aim::kSprings) restart_springs();
-    course_.step(hold);
-    const Impedance &given = course_.gains().now(),
-                    &impedance = designed_.update(course_.gains(), sensed_.robot);
+    setpoints_.step(hold);
+    const Impedance &given = setpoints_.gains().now(),
+                    &impedance = designed_.update(setpoints_.gains(), sensed_.robot);
     const NullSpace& null_space = designed_.null_space();
-    guide_.step(course_, hold, sensed_, null_space);
-    law_.torque({sensed_.robot, sensed_.q, sensed_.qd, impedance, null_space, guide_.references(),
-                 guide_.clamp(), course_.wrench(), integral_.on() ? &integral_ : nullptr},
-                asked_);
+    generator_.step(setpoints_, hold, sensed_, null_space);
+    law_.torque(
+        {sensed_.robot, sensed_.q, sensed_.qd, impedance, null_space, generator_.references(),
+         generator_.clamp(), setpoints_.wrench(), integral_.on() ? &integral_ : nullptr},
+        asked_);
     torque = asked_.torque;
     level_ = designed_.level(given);
     // While gains change, dampers that fade keep the margin as well.
-    if (!level_.kept && course_.gains().still()) status = worse(status, Status::kLittleMargin);
+    if (!level_.kept && setpoints_.gains().still()) status = worse(status, Status::kLittleMargin);
     if (given.task_weight > 0) factor = &null_space.mass();
   } else {
     if (faults_.blind() > 0) filter_.begin_anew();
@@ -172,12 +173,12 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
                     faults_.tip_speed(), aim_, asked_.dampers, torque);
   if (in_force() && integral_.on()) {
     const bool may_grow = limits == Status::kOk && !asked_.clamped;
-    if (course_.changes() != integrated_) {
-      integral_.fade(course_.steps_left());
+    if (setpoints_.changes() != integrated_) {
+      integral_.fade(setpoints_.steps_left());
     } else if (!hold) {
       integral_.step(asked_.joint_pull, asked_.tip_pull, may_grow);
     }
-    integrated_ = course_.changes();
+    integrated_ = setpoints_.changes();
   }
   status = worse(status, limits);
   faults_.applied(status, sensed_, 0, torque);
@@ -199,8 +200,8 @@ void ControllerCore::go_blind(double lost, JointVector& torque) noexcept {
 
 void ControllerCore::restart_springs() noexcept {
   aim_ = Aim::kSprings;
-  course_.restart(sensed_);
-  guide_.set_goal(course_, false, sensed_);
+  setpoints_.restart(sensed_);
+  generator_.set_goal(setpoints_, false, sensed_);
   integral_.reset();
   law_.reset();
   filter_.begin_anew();
@@ -221,26 +222,27 @@ void ControllerCore::brake() noexcept {
 LoopAnalysis::Loop ControllerCore::loop() const noexcept {
   const bool springs = aim_ == Aim::kSprings;
   TipWrenches wrenches{sensed_.external_wrench};
-  if (springs && settings_.feed_forward.wrench) wrenches.commanded = course_.wrench();
+  if (springs && settings_.feed_forward.wrench) wrenches.commanded = setpoints_.wrench();
   if (springs) wrenches.commanded += integral_.wrench();
   std::optional<Posture> posture;
   if (springs && asked_.posture_error.size() == n_) {
-    posture = {&kernel_, &sensed_.q, asked_.posture_error, guide_.references().posture.velocity()};
+    posture = {&kernel_, &sensed_.q, asked_.posture_error,
+               generator_.references().posture.velocity()};
   }
   return {snapshot_.tick,
           sensed_,
           springs,
-          {springs ? designed_.now(course_.gains().now()) : brake_, designed_.null_space(),
+          {springs ? designed_.now(setpoints_.gains().now()) : brake_, designed_.null_space(),
            springs ? friction_left_ : viscous_friction_, wrenches, posture},
-          course_.changes(),
-          course_.attachment().now()};
+          setpoints_.changes(),
+          setpoints_.attachment().now()};
 }
 
 void ControllerCore::show() noexcept {
-  const Impedance& impedance = aim_ == Aim::kSprings ? course_.gains().now() : brake_;
-  const SpringReferences& references = guide_.references();
+  const Impedance& impedance = aim_ == Aim::kSprings ? setpoints_.gains().now() : brake_;
+  const SpringReferences& references = generator_.references();
   Snapshot& shown = snapshot_;
-  shown.mode = course_.setpoint().mode;
+  shown.mode = setpoints_.setpoint().mode;
   shown.joint_weight = impedance.joint_weight;
   shown.task_weight = impedance.task_weight;
   shown.position = sensed_.q;
@@ -265,8 +267,8 @@ void ControllerCore::show() noexcept {
   shown.joint_damping_ratio = impedance.joint_damping_ratio;
   shown.task_damping_ratio = impedance.damping_ratio;
   shown.damping_level = level_.level;
-  shown.payload = course_.attachment().now().payload();
-  shown.tool = course_.attachment().now().tool;
+  shown.payload = setpoints_.attachment().now().payload();
+  shown.tool = setpoints_.attachment().now().tool;
   if (!integral_.on()) return;
   shown.integral_torque = integral_.torque();
   shown.integral_wrench = integral_.wrench();

@@ -1,8 +1,8 @@
 #pragma once
-#include <dashpot/controller/core/course.hpp>
 #include <dashpot/controller/core/faults.hpp>
-#include <dashpot/controller/core/guide.hpp>
 #include <dashpot/controller/core/loop_analysis.hpp>
+#include <dashpot/controller/core/reference_generator.hpp>
+#include <dashpot/controller/core/setpoint_history.hpp>
 #include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/controller/safety/state_check.hpp>
@@ -20,8 +20,8 @@ class ControllerCore {
   Status update(const RobotState& state, const Setpoint* setpoint, JointVector& torque) noexcept;
   void reset(const JointVector& torque) noexcept;
   void release() noexcept;
-  void stop() noexcept { course_.give_up(); }
-  void attach(const Attachment& attachment) noexcept { course_.attach(attachment); }
+  void stop() noexcept { setpoints_.give_up(); }
+  void attach(const Attachment& attachment) noexcept { setpoints_.attach(attachment); }
   void limit_tip_speed(const TipSpeed& speed) noexcept;
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
     analysis_.closed_loop(loop(), system);
@@ -58,10 +58,10 @@ class ControllerCore {
   // The stages, in the order of a tick:
   StateCheck state_check_;
   DynamicsKernel kernel_;
-  Course course_;
+  SetpointHistory setpoints_;
   Faults faults_;
   DesignedDamping designed_;
-  Guide guide_;
+  ReferenceGenerator generator_;
   ImpedanceLaw law_;
   SpringIntegral integral_;
   SafetyFilter filter_;
@@ -76,7 +76,7 @@ class ControllerCore {
   LawTorque asked_;
   analysis::DampingLevel level_;  ///< of the ratios
   Impedance brake_;               ///< damping of the brake that acts where no springs do
-  std::uint64_t integrated_ = 0;  ///< changes of the course that the integral knows of
+  std::uint64_t integrated_ = 0;  ///< changes of set-points that the integral knows of
   Snapshot snapshot_;
 };
 

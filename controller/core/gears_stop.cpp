@@ -1,12 +1,11 @@
 #include <dashpot/controller/core/gears_stop.hpp>
-#include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/safety/brake.hpp>
 #include <dashpot/controller/settings_check.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
-#include <iomanip>
-#include <sstream>
 
 namespace dashpot::controller {
 namespace {
@@ -16,12 +15,6 @@ constexpr double kEdge = 0.2;      // times the brake's T: as hard the edges of 
 constexpr double kLongest = 1e3;   // s: there is none
 constexpr double kSearched = 1e3;  // times: how far down a boundary is looked for
 constexpr int kPostures = 16;
-
-std::string number(double value) {
-  std::ostringstream text;
-  text << std::setprecision(3) << value;
-  return text.str();
-}
 
 }  // namespace
 
@@ -47,12 +40,12 @@ double gears_stopping_time(const RobotModel& model, const Settings& settings, do
   }
   if (T <= 1.01 * wanted) return T;
   const std::string gears_keys = "(robot.gear_stiffness, gear_damping, position_sensor)";
-  throw InvalidSettings(
-      "limits.stopping_time",
-      "is " + number(settings.limits.stopping_time) + " s, but with gears that bend " + gears_keys +
-          (T > kLongest
-               ? " no brake is stable: their damping is too small"
-               : " a brake keeps a gain margin of 2 from " + number(T) + " s on: ask for that"));
+  throw InvalidSettings("limits.stopping_time",
+                        "is " + text::number(settings.limits.stopping_time, 3) +
+                            " s, but with gears that bend " + gears_keys +
+                            (T > kLongest ? " no brake is stable: their damping is too small"
+                                          : " a brake keeps a gain margin of 2 from " +
+                                                text::number(T, 3) + " s on: ask for that"));
 }
 
 }  // namespace dashpot::controller

@@ -1,4 +1,4 @@
-// The course of set-points and springs from a start on: after a reset, after a fault, between
+// Set-points and springs from a start on: after a reset, after a fault, between
 // modes.
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/safety.hpp>
@@ -12,7 +12,7 @@ namespace {
 
 using testing::near;
 
-class Course : public testing::Safety {
+class SetpointHistory : public testing::Safety {
  protected:
   void make_cartesian() {
     settings.initial.mode = Mode::kCartesian;
@@ -38,7 +38,7 @@ class Course : public testing::Safety {
 };
 
 /// A reset forgets the set-point, so that the same one is new.
-TEST_F(Course, GoesToTheSameSetpointAfterAReset) {
+TEST_F(SetpointHistory, GoesToTheSameSetpointAfterAReset) {
   run(1.0);
   arm->setpoint.joint_position[0] += 0.3;
   arm->fresh = false;
@@ -52,7 +52,7 @@ TEST_F(Course, GoesToTheSameSetpointAfterAReset) {
   EXPECT_GT(snapshot().joint_error[0], 0.005);
 }
 
-TEST_F(Course, ForgetsRestartsWithAReset) {
+TEST_F(SetpointHistory, ForgetsRestartsWithAReset) {
   run(1.0);
   for (int k = 0; k < 5; ++k) {
     if (k == 3) arm->controller.reset(gravity());
@@ -63,7 +63,7 @@ TEST_F(Course, ForgetsRestartsWithAReset) {
   }
 }
 
-TEST_F(Course, HasModesAtTheFirstTickAfterAReset) {
+TEST_F(SetpointHistory, HasModesAtTheFirstTickAfterAReset) {
   settings.analysis.where = Analysis::Where::kInline;
   settings.analysis.share = 1;
   make();
@@ -81,7 +81,7 @@ TEST_F(Course, HasModesAtTheFirstTickAfterAReset) {
 }
 
 /// A controller that was neither reset nor given a set-point holds with the gains of its settings.
-TEST_F(Course, HoldsFromTheFirstTickWithTheGainsOfTheSettings) {
+TEST_F(SetpointHistory, HoldsFromTheFirstTickWithTheGainsOfTheSettings) {
   arm->controller = Controller(model, settings);
   arm->setpoint = Setpoint();
   arm->fresh = false;
@@ -90,7 +90,7 @@ TEST_F(Course, HoldsFromTheFirstTickWithTheGainsOfTheSettings) {
 }
 
 /// After a release velocities are measured again, and no longer smoothed differences.
-TEST_F(Course, BelievesVelocitiesAfterARelease) {
+TEST_F(SetpointHistory, BelievesVelocitiesAfterARelease) {
   settings.watchdog.feedback = 0.5;
   make();
   run(1.0);
@@ -109,7 +109,7 @@ TEST_F(Course, BelievesVelocitiesAfterARelease) {
 }
 
 /// Springs that start again grow from nothing, within gain_time.
-TEST_F(Course, SpringsGrowFromZeroAfterAFault) {
+TEST_F(SetpointHistory, SpringsGrowFromZeroAfterAFault) {
   run(1.0);
   ASSERT_EQ(snapshot().joint_weight, 1);
   EXPECT_NEAR(stiffness(), full(), 1e-3 * full());
@@ -123,7 +123,7 @@ TEST_F(Course, SpringsGrowFromZeroAfterAFault) {
   EXPECT_NEAR(stiffness(), full(), 1e-3 * full());
 }
 
-TEST_F(Course, ShowsNoErrorOfATipThatIsNotHeld) {
+TEST_F(SetpointHistory, ShowsNoErrorOfATipThatIsNotHeld) {
   make_cartesian();
   arm->setpoint.tip_pose.position.x() += 0.05;
   ticks(600);
@@ -138,7 +138,7 @@ TEST_F(Course, ShowsNoErrorOfATipThatIsNotHeld) {
 }
 
 /// The path of the tip is as fast as it may be where the joints are not.
-TEST_F(Course, TheTipGoesAsFastAsItMay) {
+TEST_F(SetpointHistory, TheTipGoesAsFastAsItMay) {
   settings.limits.beyond_model = true;
   settings.limits.velocity.setConstant(20);
   make_cartesian();
@@ -153,7 +153,7 @@ TEST_F(Course, TheTipGoesAsFastAsItMay) {
 
 /// In the Cartesian mode, too, the posture moves toward its goal, and stays with a set-point
 /// that names none or is stale.
-TEST_F(Course, TheRestPostureStaysWhereNobodyWantsAnother) {
+TEST_F(SetpointHistory, TheRestPostureStaysWhereNobodyWantsAnother) {
   make_cartesian();
   const JointVector start = snapshot().reference_position;
   arm->setpoint.joint_position[0] += 1;

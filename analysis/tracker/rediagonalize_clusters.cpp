@@ -1,6 +1,6 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
-#include <dashpot/analysis/linalg/cluster_separation.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
+#include <dashpot/analysis/linalg/invariant_subspaces.hpp>
 #include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 
 #include <Eigen/Eigenvalues>

@@ -1,4 +1,4 @@
-#include <dashpot/controller/core/course.hpp>
+#include <dashpot/controller/core/setpoint_history.hpp>
 #include <dashpot/controller/safety/state_check.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
@@ -8,14 +8,14 @@ static int gain_ticks(const Settings& settings) {
   return static_cast<int>(std::lround(settings.motion.gain_time / settings.period));
 }
 
-Course::Course(const RobotModel& model, const Settings& settings)
+SetpointHistory::SetpointHistory(const RobotModel& model, const Settings& settings)
     : n_(model.dof()),
       settings_(settings),
       gains_(gain_ticks(settings), Impedance(n_)),
       attachment_(gain_ticks(settings), model.attachment()),
       wrench_(gain_ticks(settings), Vector6::Zero()) {}
 
-void Course::reset() noexcept {
+void SetpointHistory::reset() noexcept {
   release();
   accepted_ = settings_.initial;
   look_.reset();
@@ -23,12 +23,12 @@ void Course::reset() noexcept {
   attachment_.start(attachment_.target());
 }
 
-void Course::release() noexcept {
+void SetpointHistory::release() noexcept {
   accepted_.wrench = settings_.initial.wrench;
   from_user_ = false;
 }
 
-Status Course::age_status() const noexcept {
+Status SetpointHistory::age_status() const noexcept {
   const double age = 1e-9 * age_;
   const Watchdog& limit = settings_.watchdog;
   const bool lost = limit.setpoint_damp > 0 ? age > limit.setpoint_damp : std::isinf(age);
@@ -37,7 +37,7 @@ Status Course::age_status() const noexcept {
   return Status::kOk;
 }
 
-Course::News Course::take(const Setpoint& setpoint, std::int64_t now) noexcept {
+SetpointHistory::News SetpointHistory::take(const Setpoint& setpoint, std::int64_t now) noexcept {
   if (look_ && look_->time == setpoint.time) return look_->in_order ? News::kNone : News::kRefused;
   const bool same =
       setpoint.mode == accepted_.mode && same_gains(setpoint.gains, accepted_.gains, setpoint.mode);
@@ -58,7 +58,7 @@ Course::News Course::take(const Setpoint& setpoint, std::int64_t now) noexcept {
   return News::kGains;
 }
 
-void Course::restart(const Sensed& now) noexcept {
+void SetpointHistory::restart(const Sensed& now) noexcept {
   const Impedance target(accepted_, n_);
   Impedance none(n_);
   none.base.selected = target.base.selected;
@@ -75,14 +75,14 @@ void Course::restart(const Sensed& now) noexcept {
                                attachment_.target().tool);
 }
 
-void Course::step(bool hold) noexcept {
+void SetpointHistory::step(bool hold) noexcept {
   gains_.step();
   const Vector6 wrench = hold ? Vector6(Vector6::Zero()) : accepted_.wrench;
   if (wrench != wrench_.target()) wrench_.set_target(wrench);
   wrench_.step();
 }
 
-void Course::attach(const Attachment& attachment) noexcept {
+void SetpointHistory::attach(const Attachment& attachment) noexcept {
   if (attachment == attachment_.target()) return;
   accepted_.tip_pose = carried(accepted_.tip_pose, attachment_.target().tool, attachment.tool);
   attachment_.set_target(attachment);

@@ -12,9 +12,9 @@ namespace dashpot::controller {
 
 /// What is wanted: the last good set-point with its age, and the gains, the wrench and the
 /// attachment on their way to what was asked for.
-class Course {
+class SetpointHistory {
  public:
-  Course(const RobotModel& model, const Settings& settings);
+  SetpointHistory(const RobotModel& model, const Settings& settings);
   /// The set-point is Settings::initial again; gains, and what is attached, stay.
   void reset() noexcept;
   /// Springs that start next stay where the robot is, with the gains in force.

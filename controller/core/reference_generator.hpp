@@ -1,26 +1,26 @@
 #pragma once
-#include <dashpot/controller/core/course.hpp>
+#include <dashpot/controller/core/setpoint_history.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/controller/motion/reference.hpp>
 
 namespace dashpot::controller {
 
-/// Leads the references of the springs to where the course wants them, as fast as the limits of tip
-/// and joints allow where the robot is. A reference whose springs are not in force starts where the
-/// robot is; of two modes in force, the one that fades away stays where it is.
-class Guide {
+/// Leads the references of the springs to where the set-points want them, as fast as the limits of
+/// tip and joints allow where the robot is. A reference whose springs are not in force starts where
+/// the robot is; of two modes in force, the one that fades away stays where it is.
+class ReferenceGenerator {
  public:
-  Guide(const RobotModel& model, const Settings& settings);
+  ReferenceGenerator(const RobotModel& model, const Settings& settings);
 
   /// Sets limits of the tip's speed for the references in either mode.
   void limit_tip_speed(const TipSpeed& speed) noexcept;
   /// T goes from one place on the tip link to another, and the tip's reference with it.
   void carry(const Pose& from, const Pose& to) noexcept;
-  /// Sets the goal of the course. With new gains, springs that are to grow from zero start where
+  /// Sets the goal of the setpoints. With new gains, springs that are to grow from zero start where
   /// the robot is.
-  void set_goal(const Course& course, bool new_gains, const Sensed& now) noexcept;
+  void set_goal(const SetpointHistory& setpoints, bool new_gains, const Sensed& now) noexcept;
   /// Moves references on by one period, in `hold` to rest.
-  void step(const Course& course, bool hold, const Sensed& now,
+  void step(const SetpointHistory& setpoints, bool hold, const Sensed& now,
             const NullSpace& null_space) noexcept;
 
   const SpringReferences& references() const noexcept { return references_; }

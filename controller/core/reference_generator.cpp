@@ -1,4 +1,4 @@
-#include <dashpot/controller/core/guide.hpp>
+#include <dashpot/controller/core/reference_generator.hpp>
 #include <dashpot/controller/core/thresholds.hpp>
 
 #include <algorithm>
@@ -9,7 +9,7 @@ namespace dashpot::controller {
 
 using Eigen::Quaterniond;
 
-Guide::Guide(const RobotModel& model, const Settings& settings)
+ReferenceGenerator::ReferenceGenerator(const RobotModel& model, const Settings& settings)
     : settings_(settings),
       references_(settings.motion, settings.period),
       clamp_{settings.limits.linear_error, settings.limits.angular_error},
@@ -21,19 +21,19 @@ Guide::Guide(const RobotModel& model, const Settings& settings)
   }
 }
 
-void Guide::limit_tip_speed(const TipSpeed& speed) noexcept {
+void ReferenceGenerator::limit_tip_speed(const TipSpeed& speed) noexcept {
   tip_speed_ = speed;
   references_.tip.limit_speed(std::min(settings_.motion.linear_velocity, speed.linear),
                               std::min(settings_.motion.angular_velocity, speed.angular));
 }
 
-void Guide::carry(const Pose& from, const Pose& to) noexcept {
+void ReferenceGenerator::carry(const Pose& from, const Pose& to) noexcept {
   const TipReference& tip = references_.tip;
   const Pose moved = carried({tip.position(), tip.rotation().toRotationMatrix()}, from, to);
   references_.tip.relocate(moved.position, Quaterniond(moved.rotation).normalized());
 }
 
-void Guide::start_new_springs(const GainBlend& gains, const Sensed& sensed) noexcept {
+void ReferenceGenerator::start_new_springs(const GainBlend& gains, const Sensed& sensed) noexcept {
   const Impedance &now = gains.now(), &then = gains.target();
   const DynamicsResult& robot = sensed.robot;
   for (int i = 0; i < static_cast<int>(goal_.size()); ++i) {
@@ -53,10 +53,11 @@ void Guide::start_new_springs(const GainBlend& gains, const Sensed& sensed) noex
   references_.tip.relocate(robot.p_BT_B + left.head<3>(), quaternion(left.tail<3>()) * tip);
 }
 
-void Guide::set_goal(const Course& course, bool new_gains, const Sensed& now) noexcept {
-  const Setpoint& wanted = course.setpoint();
-  const Impedance& impedance = course.gains().now();
-  if (new_gains) start_new_springs(course.gains(), now);
+void ReferenceGenerator::set_goal(const SetpointHistory& setpoints, bool new_gains,
+                                  const Sensed& now) noexcept {
+  const Setpoint& wanted = setpoints.setpoint();
+  const Impedance& impedance = setpoints.gains().now();
+  if (new_gains) start_new_springs(setpoints.gains(), now);
   const bool joint = wanted.mode == Mode::kJoint;
   JointReference& path = joint ? references_.joint : references_.posture;
   if ((joint ? impedance.joint_weight : impedance.task_weight) == 0) {
@@ -73,11 +74,11 @@ void Guide::set_goal(const Course& course, bool new_gains, const Sensed& now) no
   }
 }
 
-void Guide::step(const Course& course, bool hold, const Sensed& now,
-                 const NullSpace& null_space) noexcept {
-  const Impedance& impedance = course.gains().now();
+void ReferenceGenerator::step(const SetpointHistory& setpoints, bool hold, const Sensed& now,
+                              const NullSpace& null_space) noexcept {
+  const Impedance& impedance = setpoints.gains().now();
   const DynamicsResult& robot = now.robot;
-  const bool joint = course.setpoint().mode == Mode::kJoint;
+  const bool joint = setpoints.setpoint().mode == Mode::kJoint;
   if (impedance.joint_weight > 0) {
     if (joint && !hold) {
       references_.joint.step(goal_, joint_share(robot.J));
@@ -91,7 +92,7 @@ void Guide::step(const Course& course, bool hold, const Sensed& now,
     references_.posture.halt();
     return;
   }
-  const Pose goal = course.tip_goal();
+  const Pose goal = setpoints.tip_goal();
   const Quaterniond tip(robot.R_BT);
   references_.tip.step(goal.position, Quaterniond(goal.rotation).normalized(),
                        {robot.p_BT_B, tip, robot.R_BT, impedance.base, impedance.tool, clamp_},
@@ -99,13 +100,13 @@ void Guide::step(const Course& course, bool hold, const Sensed& now,
   references_.posture.step(goal_);
 }
 
-bool Guide::still(const Impedance& impedance) const noexcept {
+bool ReferenceGenerator::still(const Impedance& impedance) const noexcept {
   return (impedance.joint_weight == 0 || references_.joint.velocity().isZero(0)) &&
          (impedance.task_weight == 0 ||
           (references_.posture.velocity().isZero(0) && references_.tip.velocity().isZero(0)));
 }
 
-double Guide::tip_share(const NullSpace& null_space) noexcept {
+double ReferenceGenerator::tip_share(const NullSpace& null_space) noexcept {
   const double speed = references_.tip.speed();
   if (speed == 0) return tip_share_ = 1;
   const JointVector qd = null_space.joint_velocity(references_.tip.point_velocity());
@@ -117,7 +118,7 @@ double Guide::tip_share(const NullSpace& null_space) noexcept {
   return tip_share_ = std::min(now, tip_share_ + settings_.period / kShareRise);
 }
 
-double Guide::joint_share(const Jacobian& J) const noexcept {
+double ReferenceGenerator::joint_share(const Jacobian& J) const noexcept {
   const bool any = std::isfinite(tip_speed_.linear) || std::isfinite(tip_speed_.angular);
   const double speed = references_.joint.speed();
   if (!any || speed == 0) return 1;
