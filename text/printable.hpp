@@ -15,4 +15,9 @@ std::string printable(std::string_view text, std::string_view kept = "");
 /// there is none: a stray, overlong or cut sequence, a surrogate, or a number above U+10FFFF.
 std::size_t utf8_length(std::string_view text) noexcept;
 
+/// Returns a number in at most so many significant digits ("%.*g").
+std::string number(double value, int digits = 6);
+/// Returns a number with so many decimals ("%.*f").
+std::string fixed(double value, int decimals);
+
 }  // namespace dashpot::text

@@ -1,9 +1,9 @@
 #include <dashpot/apps/drive/drive_session.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
 #include <limits>
 #include <stdexcept>
@@ -30,12 +30,6 @@ constexpr std::int64_t kLook = 100'000;           // us between two looks at an 
 constexpr double kStands = 1e-3;                  // rad between two looks at an arm that stands
 // us: what comes later is no time of a clock, and nanoseconds would not fit.
 constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() / 2000;
-
-std::string number(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", value);
-  return text.data();
-}
 
 bool finite(const DriverStatus& status) {
   return status.position.allFinite() && status.velocity.allFinite();
@@ -232,7 +226,7 @@ bool DriveSession::fresh(std::int64_t now) {
   ++record.late;
   ++lates_;
   if (static_cast<double>(lates_) * config_.settings.period < 1e-6 * kWatch) return false;
-  throw std::runtime_error("for " + number(1e-6 * kWatch) +
+  throw std::runtime_error("for " + text::number(1e-6 * kWatch, 4) +
                            " s all statuses were older than two periods: nothing more is sent");
 }
 
@@ -242,7 +236,7 @@ void DriveSession::note_repeated(const DriverStatus& status) {
   if (1e-6 * static_cast<double>(last_ - status.utime) < 1e-6 * kWatch) return;
   if (static_cast<double>(++repeated_) * config_.settings.period < 1e-6 * kWatch) return;
   throw std::runtime_error("the driver's clock has gone back by " +
-                           number(1e-6 * static_cast<double>(last_ - status.utime)) +
+                           text::number(1e-6 * static_cast<double>(last_ - status.utime), 4) +
                            " s: nothing more is sent");
 }
 
@@ -333,9 +327,9 @@ void DriveSession::check_period() {
   record.period = 1e-6 * static_cast<double>(*middle);
   const double wanted = config_.settings.period;
   if (std::abs(record.period - wanted) > kPeriodTolerance * wanted) {
-    throw InputError("control.period", "is " + number(1e3 * wanted) +
+    throw InputError("control.period", "is " + text::number(1e3 * wanted, 4) +
                                            " ms, but the driver's statuses come every " +
-                                           number(1e3 * record.period) + " ms");
+                                           text::number(1e3 * record.period, 4) + " ms");
   }
 }
 
@@ -364,7 +358,8 @@ void DriveSession::note_external(const DriverStatus& status) {
     if (std::abs(status.external[i]) < kNearLimit * limit) continue;
     warned_external_ = true;
     warning_ = "joint " + std::to_string(i + 1) + ": external torque " +
-               number(status.external[i]) + " N m; the driver stops at " + number(limit) + " N m";
+               text::number(status.external[i], 4) + " N m; the driver stops at " +
+               text::number(limit, 4) + " N m";
   }
 }
 

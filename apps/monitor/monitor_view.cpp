@@ -4,11 +4,10 @@
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/tick_status.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <vector>
 
@@ -16,12 +15,6 @@ namespace dashpot::apps {
 namespace {
 
 using Align = TextTable::Align;
-
-std::string fixed(double value, int decimals) {
-  std::array<char, 64> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.*f", decimals, value);
-  return buffer.data();
-}
 
 std::string status_text(std::int8_t status) {
   return controller::to_text(static_cast<controller::Status>(status));
@@ -82,13 +75,14 @@ double tip_error(const state_t& state) {
 }
 
 std::string tick_times(const state_t& state) {
-  return "tick " + fixed(1e-3 * state.tick_time, 1) + " us (longest " +
-         fixed(1e-3 * state.longest_tick_time, 1) + ")";
+  return "tick " + text::fixed(1e-3 * state.tick_time, 1) + " us (longest " +
+         text::fixed(1e-3 * state.longest_tick_time, 1) + ")";
 }
 
 /// " at (0.000, 0.000, 0.100) m"
 std::string place(const double (&p)[3]) {
-  return " at (" + fixed(p[0], 3) + ", " + fixed(p[1], 3) + ", " + fixed(p[2], 3) + ") m";
+  return " at (" + text::fixed(p[0], 3) + ", " + text::fixed(p[1], 3) + ", " +
+         text::fixed(p[2], 3) + ") m";
 }
 
 /// Returns what the arm carries, where its tool is, and the damping ratios that are held.
@@ -179,18 +173,18 @@ std::string MonitorView::screen(bool bold) const {
 
 std::string MonitorView::health() const {
   const state_t& state = *state_;
-  std::string out = "  tick " + std::to_string(state.tick) + ", " + fixed(time(), 1) +
+  std::string out = "  tick " + std::to_string(state.tick) + ", " + text::fixed(time(), 1) +
                     " s: " + status_text(state.status) + "; mode " + mode_text(state.mode) +
                     "; started " + count(state.restarts, "time") + "\n";
   if (state.fault != 0) out += "  " + latched(state) + "\n";
-  out += "  " + (rate_ > 0 ? fixed(rate_, 0) : "-") + " ticks/s, " + tick_times(state) + ", " +
-         count(state.overruns, "overrun") + ", " + count(state.states_dropped, "state") +
+  out += "  " + (rate_ > 0 ? text::fixed(rate_, 0) : "-") + " ticks/s, " + tick_times(state) +
+         ", " + count(state.overruns, "overrun") + ", " + count(state.states_dropped, "state") +
          " not published\n";
   out += commands();
-  out += "  tip off its set-point by " + fixed(1e3 * tip_error(state), 2) + " mm and " +
-         fixed(std::hypot(state.tip_error[3], state.tip_error[4], state.tip_error[5]) * 180 /
-                   std::numbers::pi,
-               2) +
+  out += "  tip off its set-point by " + text::fixed(1e3 * tip_error(state), 2) + " mm and " +
+         text::fixed(std::hypot(state.tip_error[3], state.tip_error[4], state.tip_error[5]) * 180 /
+                         std::numbers::pi,
+                     2) +
          " deg\n";
   return out + "  " + told(state) + "\n";
 }
@@ -205,7 +199,7 @@ std::string MonitorView::commands() const {
   if (state.last_refusal == state_t::ACCEPTED) return out;
   const auto verdict = static_cast<lcmtypes::CommandVerdict>(state.last_refusal);
   return out + "  last rejected " +
-         fixed(1e-6 * static_cast<double>(state.utime - state.last_refusal_utime), 1) +
+         text::fixed(1e-6 * static_cast<double>(state.utime - state.last_refusal_utime), 1) +
          " s before: " + lcmtypes::to_text(verdict) + ", of sender " +
          std::to_string(state.last_refused_sender) + "\n";
 }
@@ -218,9 +212,10 @@ std::string MonitorView::joints() const {
                    {Align::kRight, {"velocity", "rad/s"}},
                    {Align::kRight, {"torque", "N m"}}});
   for (std::size_t i = 0; i < static_cast<std::size_t>(state.n); ++i) {
-    table.add_row({joint_name(static_cast<Eigen::Index>(i)), fixed(state.joint_position[i], 4),
-                   fixed(state.reference_joint_position[i], 4), fixed(state.joint_velocity[i], 4),
-                   fixed(state.joint_torque[i], 3)});
+    table.add_row({joint_name(static_cast<Eigen::Index>(i)),
+                   text::fixed(state.joint_position[i], 4),
+                   text::fixed(state.reference_joint_position[i], 4),
+                   text::fixed(state.joint_velocity[i], 4), text::fixed(state.joint_torque[i], 3)});
   }
   return table.text();
 }
@@ -254,10 +249,10 @@ std::string MonitorView::sampled_table() const {
 }
 
 std::string MonitorView::line() const {
-  std::string out = fixed(time(), 1) + " s";
+  std::string out = text::fixed(time(), 1) + " s";
   if (state_) {
     out += "  tick " + std::to_string(state_->tick) + "  " + status_text(state_->status) + "  " +
-           (rate_ > 0 ? fixed(rate_, 0) : "-") + " ticks/s, " + tick_times(*state_) + ", " +
+           (rate_ > 0 ? text::fixed(rate_, 0) : "-") + " ticks/s, " + tick_times(*state_) + ", " +
            count(state_->overruns, "overrun");
     if (state_->fault != 0) out += "  " + latched(*state_);
   }
@@ -274,9 +269,9 @@ std::string MonitorView::line() const {
 
 std::string MonitorView::summary(std::int64_t malformed) const {
   std::string out = "\n" + count(states_, "state") + " and " +
-                    count(modes_messages_, "modes message") + " over " + fixed(time(), 1) + " s; " +
-                    count(modes_lost_, "modes message") + " lost, " + count(malformed, "message") +
-                    " malformed\n";
+                    count(modes_messages_, "modes message") + " over " + text::fixed(time(), 1) +
+                    " s; " + count(modes_lost_, "modes message") + " lost, " +
+                    count(malformed, "message") + " malformed\n";
   if (mixed()) out += std::string("  Warning: ") + kMixed + "\n";
   for (std::size_t i = 0; i < statuses_.size(); ++i) {
     if (statuses_[i] == 0) continue;
@@ -285,8 +280,8 @@ std::string MonitorView::summary(std::int64_t malformed) const {
   }
   if (state_) {
     out += "  " + count(state_->overruns, "overrun") + ", longest " +
-           fixed(1e-3 * state_->longest_tick_time, 1) + " us; largest tip error " +
-           fixed(1e3 * largest_error_, 2) + " mm\n" + commands();
+           text::fixed(1e-3 * state_->longest_tick_time, 1) + " us; largest tip error " +
+           text::fixed(1e3 * largest_error_, 2) + " mm\n" + commands();
     if (state_->fault != 0) out += "  " + latched(*state_) + "\n";
   }
   if (modes_) out += "\nModes at the end\n" + modes_table();

@@ -1,6 +1,7 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/monitor/web_monitor.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/web/web_site.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 
@@ -25,20 +26,20 @@ auto from_option(const std::string& option, const Open& open) {
 }
 
 /// The modes of `dashpot identify --json`, or null.
-nlohmann::ordered_json measured_modes(const std::string& path) {
+Json measured_modes(const std::string& path) {
   if (path.empty()) return nullptr;
   std::ifstream file(path);
   if (!file) throw std::runtime_error(path + ": cannot be read");
-  const auto document = nlohmann::ordered_json::parse(file, nullptr, false);
+  const auto document = Json::parse(file, nullptr, false);
   const auto wrong = [&path](const std::string& why) {
     return std::runtime_error(path + ": " + why);
   };
   if (!document.is_object() || !document.contains("modes") || !document["modes"].is_array()) {
     throw wrong("has no list \"modes\"");
   }
-  auto modes = nlohmann::ordered_json::array();
+  auto modes = Json::array();
   for (const auto& mode : document["modes"]) {
-    nlohmann::ordered_json kept;
+    Json kept;
     for (const char* key : {"natural_frequency", "damping_ratio"}) {
       if (!mode.is_object() || !mode.contains(key) || !mode[key].is_number()) {
         throw wrong(std::string("a mode has no number \"") + key + "\"");

@@ -1,8 +1,7 @@
 #include <dashpot/apps/report/fields.hpp>
+#include <dashpot/text/printable.hpp>
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace dashpot::apps {
 
@@ -16,10 +15,7 @@ std::string csv_text(const Json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (!value.is_number_float()) return value.dump();
   const auto number = value.get<double>();
-  if (std::isnan(number)) return "";
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.17g", number);
-  return text.data();
+  return std::isnan(number) ? "" : text::number(number, 17);
 }
 
 }  // namespace dashpot::apps

@@ -1,9 +1,10 @@
 #include <dashpot/analysis/mode.hpp>
 #include <dashpot/analysis/solver_status.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/message_json.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/tick_status.hpp>
-#include <dashpot/lcmtypes/messages/message_fields.hpp>
+#include <dashpot/lcmtypes/message_fields.hpp>
 
 #include <string>
 #include <type_traits>
@@ -11,8 +12,6 @@
 
 namespace dashpot::apps {
 namespace {
-
-using MessageJson = nlohmann::ordered_json;
 
 // The text beside a number, for the enumerations that have one.
 const char* status_text(const state_t& /*of*/, std::int8_t status) {
@@ -33,16 +32,16 @@ std::vector<std::string> assumed(const auto& /*no such field*/) {
   return {};
 }
 
-MessageJson schema_of(const MessageJson& value) {
+Json schema_of(const Json& value) {
   if (value.is_object()) {
-    MessageJson schema{{"type", "object"}, {"properties", MessageJson::object()}};
+    Json schema{{"type", "object"}, {"properties", Json::object()}};
     for (const auto& [key, item] : value.items()) schema["properties"][key] = schema_of(item);
     return schema;
   }
   if (value.is_array()) {
     return {{"type", "array"},
-            {"items", value.empty() ? MessageJson{{"type", MessageJson({"number", "null"})}}
-                                    : schema_of(value.front())}};
+            {"items",
+             value.empty() ? Json{{"type", Json({"number", "null"})}} : schema_of(value.front())}};
   }
   if (value.is_string()) return {{"type", "string"}};
   if (value.is_number_integer()) return {{"type", "integer"}};
@@ -53,8 +52,8 @@ MessageJson schema_of(const MessageJson& value) {
 }  // namespace
 
 template <class Message>
-MessageJson message_json(const Message& message) {
-  MessageJson json;
+Json message_json(const Message& message) {
+  Json json;
   lcmtypes::visit_fields<Message>([&](const std::string& name, auto field) {
     const auto& value = message.*field;
     json[name] = value;
@@ -62,20 +61,20 @@ MessageJson message_json(const Message& message) {
     if constexpr (std::is_same_v<Value, std::int8_t>) {
       if (name == "status" || name == "fault") json[name + "_text"] = status_text(message, value);
     } else if constexpr (std::is_same_v<Value, std::vector<std::int8_t>>) {
-      json[name + "_text"] = MessageJson::array();
+      json[name + "_text"] = Json::array();
       for (const std::int8_t kind : value) json[name + "_text"].push_back(kind_text(kind));
     }
     if (name == "assumes") json[name + "_text"] = assumed(value);
   });
   return json;
 }
-template MessageJson message_json(const state_t& message);
-template MessageJson message_json(const contact_t& message);
-template MessageJson message_json(const modes_t& message);
-template MessageJson message_json(const sampled_modes_t& message);
+template Json message_json(const state_t& message);
+template Json message_json(const contact_t& message);
+template Json message_json(const modes_t& message);
+template Json message_json(const sampled_modes_t& message);
 
-MessageJson json_schema(const MessageJson& example, const std::string& title) {
-  MessageJson schema = schema_of(example);
+Json json_schema(const Json& example, const std::string& title) {
+  Json schema = schema_of(example);
   schema["$schema"] = "http://json-schema.org/draft-07/schema#";
   schema["title"] = title;
   return schema;

@@ -1,10 +1,9 @@
 #include <dashpot/apps/report/system_report.hpp>
 #include <dashpot/apps/report/text_table.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <utility>
 
@@ -197,7 +196,7 @@ class Writer {
     blank_line();
     heading(title);
     std::vector<std::string> times;
-    for (const double time : response.times) times.push_back(format_time(time));
+    for (const double time : response.times) times.push_back(text::number(time));
     const double negligible = 1e-13 * largest(response, part);
     for (Eigen::Index first = 0; first < n; first += kColumns) {
       TextTable table;
@@ -223,13 +222,6 @@ class Writer {
       }
     }
     return result;
-  }
-
-  /// In the fewest digits, up to six.
-  static std::string format_time(double time) {
-    std::array<char, 32> buffer{};
-    std::snprintf(buffer.data(), buffer.size(), "%g", time);
-    return buffer.data();
   }
 
   bool bold_;

@@ -1,4 +1,5 @@
 #include <dashpot/apps/report/text_table.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
 #include <array>
@@ -97,6 +98,13 @@ std::string format_bound(double bound) {
   return text;
 }
 
+std::string with_deviation(double value, double deviation) {
+  if (!std::isfinite(deviation)) return format_number(value, 3) + " +- ?";
+  const double size = std::max({deviation, 1e-12 * std::abs(value), 1e-300});
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 12);
+  return text::fixed(value, decimals) + " +- " + text::fixed(deviation, decimals);
+}
+
 std::vector<std::string> format_column(const std::vector<double>& values, int digits) {
   double largest = 0;
   for (const double value : values) {
@@ -112,9 +120,7 @@ std::vector<std::string> format_column(const std::vector<double>& values, int di
       result.push_back(format_number(zero ? 0 : value, digits));
       continue;
     }
-    std::array<char, 40> buffer{};
-    std::snprintf(buffer.data(), buffer.size(), "%.*f", decimals, value);
-    result.emplace_back(buffer.data());
+    result.push_back(text::fixed(value, decimals));
   }
   return result;
 }

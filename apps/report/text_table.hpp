@@ -45,6 +45,9 @@ std::string format_list(const Eigen::VectorXd& values, int digits);
 
 /// An upper bound with two significant digits, rounded up; "none" if it is infinite or NaN.
 std::string format_bound(double bound);
+/// Returns "12.345 +- 0.012": two digits of the deviation, and as many of the value; "?" stands for
+/// a deviation that is not finite.
+std::string with_deviation(double value, double deviation);
 
 /// Numbers of one column with as many decimals as give the largest so many significant digits; what
 /// rounds to zero is "0".

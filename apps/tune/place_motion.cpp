@@ -1,3 +1,4 @@
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/tune/place_motion.hpp>
 #include <dashpot/controller/settings.hpp>
 
@@ -11,7 +12,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using MotionJson = nlohmann::ordered_json;
 
 /// The transition of (q, q') over a time.
 MatrixXd transition_over(const analysis::Response& response, Eigen::Index n, double time) {
@@ -26,8 +26,8 @@ MatrixXd transition_over(const analysis::Response& response, Eigen::Index n, dou
 
 }  // namespace
 
-MotionJson release_json(const analysis::Response& response, const analysis::Spectrum<>& spectrum,
-                        const VectorXd& motion, const Eigen::RowVectorXd& row) {
+Json release_json(const analysis::Response& response, const analysis::Spectrum<>& spectrum,
+                  const VectorXd& motion, const Eigen::RowVectorXd& row) {
   double decay = std::numeric_limits<double>::infinity();
   for (const analysis::Mode<>& mode : spectrum.modes) {
     for (const auto& value : mode.eigenvalues) {
@@ -71,7 +71,7 @@ MotionJson release_json(const analysis::Response& response, const analysis::Spec
     }
     overshoot = std::max(overshoot, -value_at(0.5 * (a + b)));
   }
-  MotionJson settling;
+  Json settling;
   if (!grows && last + 1 < kPoints) {
     double a = times[static_cast<std::size_t>(last)], b = times[static_cast<std::size_t>(last) + 1];
     for (int i = 0; i < 40; ++i) {
@@ -82,7 +82,7 @@ MotionJson release_json(const analysis::Response& response, const analysis::Spec
   }
   return {{"time", times},
           {"value", values},
-          {"overshoot", grows ? MotionJson() : MotionJson(overshoot)},
+          {"overshoot", grows ? Json() : Json(overshoot)},
           {"settling_time", settling}};
 }
 

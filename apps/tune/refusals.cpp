@@ -1,3 +1,4 @@
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/tune/tuned_loop.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/gain_judge.hpp>
@@ -12,14 +13,14 @@
 namespace dashpot::apps {
 namespace {
 
-nlohmann::ordered_json refusal_json(const std::string& key, const std::string& reason) {
+Json refusal_json(const std::string& key, const std::string& reason) {
   return {{"key", key}, {"reason", reason}};
 }
 
 }  // namespace
 
-nlohmann::ordered_json warnings(const TunedArm& arm, const TunedDesign& design) {
-  nlohmann::ordered_json result = nlohmann::ordered_json::array();
+Json warnings(const TunedArm& arm, const TunedDesign& design) {
+  Json result = Json::array();
   for (const std::string& one : arm.model().warnings()) result.push_back(refusal_json("arm", one));
   if (design.stated.inertia_blocks) return result;
   for (const std::string& one : controller::doubtful_gains(arm.model(), design.stated.gains)) {
@@ -28,9 +29,8 @@ nlohmann::ordered_json warnings(const TunedArm& arm, const TunedDesign& design) 
   return result;
 }
 
-nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
-                                const controller::JointVector& q) {
-  nlohmann::ordered_json result = nlohmann::ordered_json::array();
+Json refusals(const TunedArm& arm, const TunedDesign& design, const controller::JointVector& q) {
+  Json result = Json::array();
   const std::string lost = controller::lost_directions(arm.model(), q);
   if (!lost.empty() && design.stated.mode == controller::Mode::kCartesian) {
     result.push_back(refusal_json("q", "the posture is singular: no spring acts in direction " +

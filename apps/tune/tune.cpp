@@ -55,8 +55,7 @@ std::vector<controller::JointVector> listed(const TuneOptions& options,
 /// The posture of --q, else the start of the configuration's scenario, else the usual one.
 controller::JointVector posture_of(const TuneOptions& options,
                                    const controller::RobotModel& model) {
-  const controller::YamlNode document =
-      controller::parse_yaml(controller::read_regular_file(options.config));
+  const text::YamlNode document = text::parse_yaml(text::read_regular_file(options.config));
   if (options.posture.q.empty() && has_key(document, "scenario")) {
     return load_scene(options.config).start;
   }

@@ -4,7 +4,7 @@
 #include <dashpot/apps/tune/tuned_loop.hpp>
 #include <dashpot/apps/web/arm_view.hpp>
 #include <dashpot/apps/web/web_site.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/rotors.hpp>
 
 #include <array>
@@ -20,12 +20,10 @@
 namespace dashpot::apps {
 namespace {
 
-using TunePage = nlohmann::ordered_json;
-
 constexpr std::size_t kMostArms = 8;
 constexpr const char* kPaper = "the paper's Discussion, C_C1";
 
-HttpAnswer answer_of(unsigned status, const TunePage& document) {
+HttpAnswer answer_of(unsigned status, const Json& document) {
   return {status, "application/json", std::make_shared<const std::string>(line_of(document))};
 }
 
@@ -42,8 +40,8 @@ std::string random_token() {
 
 /// The gains of public controllers as designs, and the task of the paper's Discussion: its
 /// stiffness and its C_C1, see docs/tuning-page.md.
-TunePage presets_json(int n) {
-  TunePage list = TunePage::array();
+Json presets_json(int n) {
+  Json list = Json::array();
   for (const GainPreset& preset : kPresets) {
     const double t = preset.translation, r = preset.rotation;
     list.push_back(
@@ -70,24 +68,23 @@ TunePage presets_json(int n) {
   return list;
 }
 
-const TunePage& wanted(const TunePage& asked, const char* key) {
+const Json& wanted(const Json& asked, const char* key) {
   if (!asked.is_object() || !asked.contains(key)) throw InputError(key, "missing");
   return asked[key];
 }
 
-controller::JointVector posture(const TunePage& told, const controller::RobotModel& model) {
+controller::JointVector posture(const Json& told, const controller::RobotModel& model) {
   static constexpr std::array<std::string_view, 1> kKeys = {"q"};
-  const controller::YamlNode document = yaml_of({{"q", told}});
-  const controller::YamlMapping keys(document, "", kKeys);
+  const text::YamlNode document = yaml_of({{"q", told}});
+  const text::YamlMapping keys(document, "", kKeys);
   if (!keys.has("q")) throw keys.error("q", "missing");
   controller::JointVector q(model.dof());
-  controller::read_numbers(keys, "q", controller::joint_units(model, "rad", "m"), {-1e9, true, 1e9},
-                           q);
+  text::read_numbers(keys, "q", controller::joint_units(model, "rad", "m"), {-1e9, true, 1e9}, q);
   return q;
 }
 
-std::int64_t whole_number(const TunePage& asked, const char* key, std::int64_t most) {
-  const TunePage& value = wanted(asked, key);
+std::int64_t whole_number(const Json& asked, const char* key, std::int64_t most) {
+  const Json& value = wanted(asked, key);
   const bool whole = value.is_number_unsigned();
   if (!whole || value.get<std::uint64_t>() > static_cast<std::uint64_t>(most)) {
     throw InputError(key, "has to be a whole number from 0 to " + std::to_string(most));
@@ -100,25 +97,25 @@ std::int64_t whole_number(const TunePage& asked, const char* key, std::int64_t m
 TuneSite::TuneSite(TunedArm arm, TuneStart start)
     : arm_(std::move(arm)), start_(std::move(start)), token_(random_token()) {}
 
-TunePage TuneSite::setup() const {
+Json TuneSite::setup() const {
   const controller::RobotModel& model = arm_.model();
   const controller::UnknownRotors rotors = controller::unknown_rotors(model);
   const controller::Drives* published = controller::drives_like(model);
-  TunePage document = {{"token", token_},
-                       {"arm", chain_json(model)},
-                       {"robot",
-                        {{"urdf", std::filesystem::absolute(arm_.robot().urdf).lexically_normal()},
-                         {"base", arm_.robot().base},
-                         {"tip", arm_.robot().tip},
-                         {"config", start_.config},
-                         {"keys", robot_keys(arm_.robot())}}},
-                       {"q", json_list(start_.q)},
-                       {"designs", start_.designs},
-                       {"presets", presets_json(model.dof())},
-                       {"usual_margin", controller::Settings().limits.gain_margin},
-                       {"rotors_unknown", rotors.any()},
-                       {"postures", TunePage::array()},
-                       {"published", nullptr}};
+  Json document = {{"token", token_},
+                   {"arm", chain_json(model)},
+                   {"robot",
+                    {{"urdf", std::filesystem::absolute(arm_.robot().urdf).lexically_normal()},
+                     {"base", arm_.robot().base},
+                     {"tip", arm_.robot().tip},
+                     {"config", start_.config},
+                     {"keys", robot_keys(arm_.robot())}}},
+                   {"q", json_list(start_.q)},
+                   {"designs", start_.designs},
+                   {"presets", presets_json(model.dof())},
+                   {"usual_margin", controller::Settings().limits.gain_margin},
+                   {"rotors_unknown", rotors.any()},
+                   {"postures", Json::array()},
+                   {"published", nullptr}};
   for (const controller::JointVector& q : start_.postures)
     document["postures"].push_back(json_list(q));
   for (const auto& [key, property] :
@@ -146,7 +143,7 @@ HttpAnswer TuneSite::get(const std::string& path) const {
   return {200, std::string(file->type), std::make_shared<const std::string>(file->text)};
 }
 
-const TunedArm& TuneSite::arm_of(const TunePage& design) {
+const TunedArm& TuneSite::arm_of(const Json& design) {
   if (!design.is_object() || !design.contains("arm") || design["arm"].empty()) return arm_;
   const std::string parts = line_of(design["arm"]);
   const auto found = arms_.find(parts);
@@ -155,8 +152,8 @@ const TunedArm& TuneSite::arm_of(const TunePage& design) {
   return arms_.emplace(parts, arm_.with(design["arm"])).first->second;
 }
 
-TunePage TuneSite::answer(const std::string& path, const TunePage& asked) {
-  const TunePage& told = wanted(asked, "design");
+Json TuneSite::answer(const std::string& path, const Json& asked) {
+  const Json& told = wanted(asked, "design");
   const TunedArm& arm = arm_of(told);
   const TunedDesign design = read_design(arm, told);
   if (path == "/workspace") {
@@ -165,10 +162,10 @@ TunePage TuneSite::answer(const std::string& path, const TunePage& asked) {
     const std::int64_t count = whole_number(asked, "count", kMostPostures);
     return TunedLoop(arm, design).workspace(static_cast<std::uint64_t>(seed), first, count);
   }
-  const TunePage& place = wanted(asked, "place");
+  const Json& place = wanted(asked, "place");
   if (!place.is_string()) throw InputError("place", "has to be a text");
   const controller::JointVector q = posture(wanted(asked, "q"), arm.model());
-  TunePage result = TunedLoop(arm, design).at(q, place.get<std::string>());
+  Json result = TunedLoop(arm, design).at(q, place.get<std::string>());
   result["refused"] = refusals(arm, design, q);
   result["warned"] = warnings(arm, design);
   return result;
@@ -176,7 +173,7 @@ TunePage TuneSite::answer(const std::string& path, const TunePage& asked) {
 
 HttpAnswer TuneSite::post(const std::string& path, const std::string& body) {
   if (path != "/design" && path != "/workspace") return answer_of(404, {{"error", "not found"}});
-  const TunePage asked = TunePage::parse(body, nullptr, false);
+  const Json asked = Json::parse(body, nullptr, false);
   if (asked.is_discarded()) return answer_of(400, {{"error", "is no JSON"}});
   try {
     return answer_of(200, answer(path, asked));

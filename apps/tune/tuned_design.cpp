@@ -1,10 +1,8 @@
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/tune/tuned_design.hpp>
-#include <dashpot/controller/config/config_gains.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/model/urdf_tree.hpp>
 
 #include <algorithm>
 #include <array>
@@ -18,14 +16,13 @@ namespace {
 using controller::InputError;
 using controller::JointVector;
 using controller::Mode;
-using controller::Range;
-using controller::YamlMapping;
-using controller::YamlNode;
-using TuneJson = nlohmann::ordered_json;
+using text::Range;
+using text::YamlMapping;
+using text::YamlNode;
 
 /// With the text of the URDF, so that each arm is made from the same.
 controller::RobotDescription with_text(controller::RobotDescription robot) {
-  if (robot.text.empty()) robot.text = controller::read_text(robot.urdf);
+  if (robot.text.empty()) robot.text = controller::read_urdf_file(robot.urdf);
   return robot;
 }
 
@@ -38,7 +35,7 @@ template <class Value>
 using Choices = std::array<std::pair<std::string_view, Value>, 2>;
 
 /// Null stands for a key that is missing, or, in a list, for none.
-TuneJson without_nulls(TuneJson json, int depth = 0) {
+Json without_nulls(Json json, int depth = 0) {
   constexpr int kDeepest = 8;  // a design has four levels
   if (!json.is_structured()) return json;
   if (depth > kDeepest) throw controller::InputError("", "lists are nested too deeply");
@@ -47,7 +44,7 @@ TuneJson without_nulls(TuneJson json, int depth = 0) {
       at = json.erase(at);
       continue;
     }
-    *at = at->is_null() ? TuneJson("none") : without_nulls(*at, depth + 1);
+    *at = at->is_null() ? Json("none") : without_nulls(*at, depth + 1);
     ++at;
   }
   return json;
@@ -55,13 +52,12 @@ TuneJson without_nulls(TuneJson json, int depth = 0) {
 
 /// Returns the gains of one part as a configuration has them. {"ratio": Z} is its damping_ratio;
 /// F of {"factor": F}, of sqrt(stiffness), is left to `factor`.
-TuneJson part_of(const TuneJson& design, const char* stiffness, const char* damping,
-                 double& factor) {
+Json part_of(const Json& design, const char* stiffness, const char* damping, double& factor) {
   static constexpr std::array<std::string_view, 2> kKeys = {"factor", "ratio"};
-  TuneJson part = TuneJson::object();
+  Json part = Json::object();
   if (design.contains(stiffness)) part["stiffness"] = design[stiffness];
   if (!design.contains(damping)) return part;
-  const TuneJson& given = design[damping];
+  const Json& given = design[damping];
   if (!given.is_object()) {
     part["damping"] = given;
     return part;
@@ -83,12 +79,12 @@ Matrix of_root(double factor, const Matrix& K) {
   return factor * K.cwiseMax(0).cwiseSqrt();
 }
 
-controller::Gains gains_of(const TuneJson& design, const controller::RobotModel& model) {
+controller::Gains gains_of(const Json& design, const controller::RobotModel& model) {
   static constexpr std::array<std::string_view, 1> kKeys = {"gains"};
   double task = 0, joint = 0, null_space = 0;
-  TuneJson parts = {{"task", part_of(design, "stiffness", "damping", task)},
-                    {"joint", part_of(design, "joint_stiffness", "joint_damping", joint)},
-                    {"null_space", part_of(design, "null_stiffness", "null_damping", null_space)}};
+  Json parts = {{"task", part_of(design, "stiffness", "damping", task)},
+                {"joint", part_of(design, "joint_stiffness", "joint_damping", joint)},
+                {"null_space", part_of(design, "null_stiffness", "null_damping", null_space)}};
   if (design.contains("frame")) parts["task"]["frame"] = design["frame"];
   const YamlNode document = yaml_of({{"gains", parts}});
   controller::Gains gains = controller::read_gains({document, "", kKeys}, model);
@@ -98,12 +94,12 @@ controller::Gains gains_of(const TuneJson& design, const controller::RobotModel&
   return gains;
 }
 
-TuneJson matrix_json(const Eigen::MatrixXd& matrix) {
+Json matrix_json(const Eigen::MatrixXd& matrix) {
   const Eigen::MatrixXd diagonal = matrix.diagonal().asDiagonal();
   return matrix == diagonal ? json_list(matrix.diagonal()) : json_rows(matrix);
 }
 
-TuneJson damping_json(double ratio, const Eigen::MatrixXd& damping) {
+Json damping_json(double ratio, const Eigen::MatrixXd& damping) {
   if (ratio > 0) return {{"ratio", ratio}};
   return matrix_json(damping);
 }
@@ -130,9 +126,9 @@ controller::Settings settings_of(const TunedArm& arm, const controller::AuditOpt
 
 }  // namespace
 
-TuneJson robot_keys(const controller::RobotDescription& robot) {
+Json robot_keys(const controller::RobotDescription& robot) {
   const controller::ModelOptions plain, &options = robot.options;
-  TuneJson keys = TuneJson::object();
+  Json keys = Json::object();
   if (options.gravity != plain.gravity) keys["gravity"] = json_list(options.gravity);
   if (!options.include_off_chain) keys["include_off_chain"] = false;
   if (options.accept_inertias) keys["accept_inertias"] = true;
@@ -148,7 +144,7 @@ TuneJson robot_keys(const controller::RobotDescription& robot) {
     if (values->size() > 0) keys[key] = json_list(*values);
   }
   if (keys.contains("gear_stiffness")) {
-    for (TuneJson& one : keys["gear_stiffness"]) {
+    for (Json& one : keys["gear_stiffness"]) {
       if (!one.is_number() || std::isinf(one.get<double>())) one = "none";
     }
   }
@@ -170,8 +166,8 @@ TuneJson robot_keys(const controller::RobotDescription& robot) {
   return keys;
 }
 
-YamlNode yaml_of(const TuneJson& json) {
-  return controller::parse_made_yaml(without_nulls(json).dump());
+YamlNode yaml_of(const Json& json) {
+  return text::parse_made_yaml(without_nulls(json).dump());
 }
 
 TunedArm::TunedArm(controller::RobotDescription robot, const controller::Settings* settings)
@@ -183,7 +179,7 @@ TunedArm::TunedArm(controller::RobotDescription robot, const controller::Setting
   if (torque_guessed_) settings_.limits.torque.setConstant(100);
 }
 
-TunedArm TunedArm::with(const TuneJson& parts) const {
+TunedArm TunedArm::with(const Json& parts) const {
   static constexpr std::array<std::string_view, 6> kKeys = {"payload",          "reflected_inertia",
                                                             "viscous_friction", "gear_stiffness",
                                                             "gear_damping",     "position_sensor"};
@@ -202,7 +198,7 @@ bool TunedDesign::designed() const {
   return gains.task_damping_ratio > 0 || gains.null_damping_ratio > 0;
 }
 
-TunedDesign read_design(const TunedArm& arm, const TuneJson& design) {
+TunedDesign read_design(const TunedArm& arm, const Json& design) {
   static constexpr std::array<std::string_view, 19> kKeys = {"mode",
                                                              "frame",
                                                              "stiffness",
@@ -254,7 +250,7 @@ TunedDesign read_design(const TunedArm& arm, const TuneJson& design) {
   return result;
 }
 
-TuneJson design_json(const TunedArm& arm) {
+Json design_json(const TunedArm& arm) {
   const controller::Settings& settings = arm.settings();
   const controller::Gains& gains = settings.initial.gains;
   const auto& sampled = settings.analysis.sampled;
@@ -280,7 +276,7 @@ TuneJson design_json(const TunedArm& arm) {
           {"integral_time", settings.integral.time},
           {"ideal_gravity", !settings.feed_forward.gravity},
           {"gain_margin", settings.limits.gain_margin},
-          {"arm", TuneJson::object()}};
+          {"arm", Json::object()}};
 }
 
 }  // namespace dashpot::apps

@@ -2,7 +2,7 @@
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/robot_description.hpp>
 #include <dashpot/controller/settings.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
+#include <dashpot/text/yaml_document.hpp>
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -57,6 +57,6 @@ nlohmann::ordered_json robot_keys(const controller::RobotDescription& robot);
 
 /// Returns JSON as YAML, which it is but for null: that stands for a key that is missing, or, in a
 /// list, for none.
-controller::YamlNode yaml_of(const nlohmann::ordered_json& json);
+text::YamlNode yaml_of(const nlohmann::ordered_json& json);
 
 }  // namespace dashpot::apps

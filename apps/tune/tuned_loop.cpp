@@ -30,7 +30,6 @@ using controller::Mode;
 using controller::PostureNumbers;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using LoopJson = nlohmann::ordered_json;
 
 /// The joint with the largest part of a shape.
 int largest_joint(const Eigen::VectorXcd& shape, int n) {
@@ -51,9 +50,9 @@ MatrixXd of_controller(const analysis::Gears& gears, const MatrixXd& A) {
 }
 
 /// d ratio / d entry of the stiffness and damping that the controller has, a matrix a mode.
-LoopJson sensitivity_json(const analysis::System<>& system, const analysis::Spectrum<>& spectrum,
-                          const analysis::Gears& gears, const MatrixXd* J) {
-  LoopJson of_stiffness = LoopJson::array(), of_damping = LoopJson::array();
+Json sensitivity_json(const analysis::System<>& system, const analysis::Spectrum<>& spectrum,
+                      const analysis::Gears& gears, const MatrixXd* J) {
+  Json of_stiffness = Json::array(), of_damping = Json::array();
   for (const analysis::ModeSensitivity& mode : analysis::sensitivities(system, spectrum)) {
     const auto rows = [&](const MatrixXd& all) {
       MatrixXd G = of_controller(gears, all);
@@ -68,8 +67,8 @@ LoopJson sensitivity_json(const analysis::System<>& system, const analysis::Spec
 
 /// Which motion comes to the edge of stability first when the gains grow: the loop with gains just
 /// beyond the margin has a z outside the unit circle.
-LoopJson limit_json(const analysis::System<>& system, const analysis::SampledLoop& loop,
-                    double margin, const controller::RobotModel& model) {
+Json limit_json(const analysis::System<>& system, const analysis::SampledLoop& loop, double margin,
+                const controller::RobotModel& model) {
   if (!(margin > 0) || !std::isfinite(margin)) return nullptr;
   const double factor = 1.001 * margin;
   const Eigen::Index n = system.dof();
@@ -101,7 +100,7 @@ LoopJson limit_json(const analysis::System<>& system, const analysis::SampledLoo
     for (const auto& z : *others) see(z, -1);
   }
   if (largest < 1) return nullptr;
-  LoopJson joint;
+  Json joint;
   if (mode >= 0 && mode < spectrum.modes.size()) {
     joint = model
                 .joints()[static_cast<std::size_t>(
@@ -128,7 +127,7 @@ void set_designed_damping(const analysis::System<>& system, const analysis::Gear
 }
 
 /// Stiffness and damping that act at the tip or in the joints, without friction.
-LoopJson gains_json(const analysis::TaskImpedance& parts, const MatrixXd& friction) {
+Json gains_json(const analysis::TaskImpedance& parts, const MatrixXd& friction) {
   if (parts.jacobian) {
     return {{"stiffness", json_rows(*parts.task_stiffness)},
             {"damping", json_rows(*parts.task_damping)}};
@@ -138,14 +137,14 @@ LoopJson gains_json(const analysis::TaskImpedance& parts, const MatrixXd& fricti
 }
 
 /// The loop as `dashpot analyze` takes it: as its parts, or where gears bend as a whole.
-LoopJson system_json(const analysis::System<>& system, const analysis::TaskImpedance& parts,
-                     bool rigid) {
+Json system_json(const analysis::System<>& system, const analysis::TaskImpedance& parts,
+                 bool rigid) {
   if (!rigid) {
     return {{"mass", json_rows(system.mass)},
             {"damping", json_rows(system.damping)},
             {"stiffness", json_rows(system.stiffness)}};
   }
-  LoopJson result = {{"mass", json_rows(parts.mass)}};
+  Json result = {{"mass", json_rows(parts.mass)}};
   const auto add = [&result](const char* name, const std::optional<MatrixXd>& matrix) {
     if (matrix) result[name] = json_rows(*matrix);
   };
@@ -240,10 +239,10 @@ nlohmann::ordered_json TunedLoop::workspace(std::uint64_t seed, std::int64_t fir
   }
   if (failure) std::rethrow_exception(failure);
   count = std::min(count, next.load());  // the threads end what they have begun
-  LoopJson result = {{"count", count},
-                     {"smallest_ratio", LoopJson::array()},
-                     {"gain_margin", LoopJson::array()},
-                     {"worst", LoopJson::object()}};
+  Json result = {{"count", count},
+                 {"smallest_ratio", Json::array()},
+                 {"gain_margin", Json::array()},
+                 {"worst", Json::object()}};
   const auto add = [&](const char* name, double PostureNumbers::*number) {
     double worst = kNone;
     std::int64_t at = -1;
@@ -283,20 +282,20 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
     motion[n + static_cast<Eigen::Index>(k)] = moved.motion[gears_.joints()[k]];
   }
   const analysis::Response response(loop.system, loop.spectrum);
-  LoopJson result = {{"modes", modes_json(loop.spectrum)},
-                     {"zero_modes", json_rows(loop.spectrum.zero_modes.basis.transpose())},
-                     {"soft_or_zero", here.zero_modes},
-                     {"smallest_ratio", here.smallest_ratio},
-                     {"fastest_pole", here.fastest_pole},
-                     {"gain_margin", std::isinf(here.gain_margin) ? 1e6 : here.gain_margin},
-                     {"assumes", loop_assumptions(design_.stated, &model)},
-                     {"damping_level", nullptr},
-                     {"limit", nullptr},
-                     {"release", release_json(response, loop.spectrum, motion, row)},
-                     {"frequency", receptance_json(loop.system, loop.spectrum, row, moved.unit)},
-                     {"sensitivity", nullptr},
-                     {"system", system_json(loop.system, loop.parts, rigid)},
-                     {"gains", gains_json(loop.parts, friction)}};
+  Json result = {{"modes", modes_json(loop.spectrum)},
+                 {"zero_modes", json_rows(loop.spectrum.zero_modes.basis.transpose())},
+                 {"soft_or_zero", here.zero_modes},
+                 {"smallest_ratio", here.smallest_ratio},
+                 {"fastest_pole", here.fastest_pole},
+                 {"gain_margin", std::isinf(here.gain_margin) ? 1e6 : here.gain_margin},
+                 {"assumes", loop_assumptions(design_.stated, &model)},
+                 {"damping_level", nullptr},
+                 {"limit", nullptr},
+                 {"release", release_json(response, loop.spectrum, motion, row)},
+                 {"frequency", receptance_json(loop.system, loop.spectrum, row, moved.unit)},
+                 {"sensitivity", nullptr},
+                 {"system", system_json(loop.system, loop.parts, rigid)},
+                 {"gains", gains_json(loop.parts, friction)}};
   if (loop.level) {
     result["damping_level"] = {{"share", loop.level->level}, {"kept", loop.level->kept}};
   }

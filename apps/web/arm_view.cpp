@@ -13,27 +13,25 @@
 namespace dashpot::apps {
 namespace {
 
-using ArmJson = nlohmann::ordered_json;
-
-ArmJson frame_json(const KDL::Frame& frame) {
-  ArmJson rows = ArmJson::array();
+Json frame_json(const KDL::Frame& frame) {
+  Json rows = Json::array();
   for (int i = 0; i < 4; ++i) {
-    ArmJson row = ArmJson::array();
+    Json row = Json::array();
     for (int j = 0; j < 4; ++j) row.push_back(frame(i, j));
     rows.push_back(row);
   }
   return rows;
 }
 
-ArmJson vector_json(const KDL::Vector& vector) {
-  return ArmJson{vector.x(), vector.y(), vector.z()};
+Json vector_json(const KDL::Vector& vector) {
+  return Json{vector.x(), vector.y(), vector.z()};
 }
 
 }  // namespace
 
-ArmJson chain_json(const controller::RobotModel& model) {
+Json chain_json(const controller::RobotModel& model) {
   const KDL::Chain& chain = controller::kdl_chain(model);
-  ArmJson document{{"name", model.name()}, {"joints", ArmJson::array()}};
+  Json document{{"name", model.name()}, {"joints", Json::array()}};
   const auto& joints = model.joints();
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const KDL::Segment& segment = chain.getSegment(static_cast<unsigned>(i));
@@ -60,12 +58,12 @@ ArmView::ArmView(const std::string& config) : config_(controller::load_config(co
   }
 }
 
-ArmJson ArmView::chain() const {
-  ArmJson document = chain_json(config_.model);
-  document["walls"] = ArmJson::array();
+Json ArmView::chain() const {
+  Json document = chain_json(config_.model);
+  document["walls"] = Json::array();
   const auto add_wall = [&walls = document["walls"]](
                             const std::string& name, const Eigen::Vector3d& p,
-                            const Eigen::Vector3d& normal, const ArmJson& stiffness) {
+                            const Eigen::Vector3d& normal, const Json& stiffness) {
     walls.push_back({{"name", name},
                      {"point", {p.x(), p.y(), p.z()}},
                      {"normal", {normal.x(), normal.y(), normal.z()}},
@@ -86,8 +84,8 @@ double ArmView::wanted_ratio(int mode) const {
   return mode == state_t::CARTESIAN ? gains.task_damping_ratio : gains.joint_damping_ratio;
 }
 
-ArmJson ArmView::response(const std::vector<double>& position, int mode,
-                          const std::string& place) const {
+Json ArmView::response(const std::vector<double>& position, int mode,
+                       const std::string& place) const {
   const Eigen::VectorXd q = Eigen::Map<const Eigen::VectorXd>(
       position.data(), static_cast<Eigen::Index>(position.size()));
   if (q.size() != dof() || !q.allFinite()) throw std::runtime_error("the arm has other joints");
@@ -103,9 +101,9 @@ ArmJson ArmView::response(const std::vector<double>& position, int mode,
   Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(system.dof());  // of the links, not of motors
   row.head(q.size()) = seen.row;
   const analysis::Spectrum<> spectrum = analysis::analyze(system);
-  ArmJson result = receptance_json(system, spectrum, row, seen.unit);
+  Json result = receptance_json(system, spectrum, row, seen.unit);
   result["zero_modes"] = json_rows(spectrum.zero_modes.basis.transpose());
-  result["damping_ratio"] = ArmJson::array();
+  result["damping_ratio"] = Json::array();
   for (const auto& found : spectrum.modes) result["damping_ratio"].push_back(found.damping_ratio);
   return result;
 }

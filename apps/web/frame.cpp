@@ -1,5 +1,6 @@
 #include <dashpot/analysis/mode.hpp>
 #include <dashpot/analysis/solver_status.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/message_json.hpp>
 #include <dashpot/apps/web/frame.hpp>
 
@@ -9,11 +10,9 @@
 namespace dashpot::apps {
 namespace {
 
-using FrameJson = nlohmann::ordered_json;
-
 template <class T>
-FrameJson or_null(const std::optional<T>& value) {
-  return value ? FrameJson(*value) : FrameJson();
+Json or_null(const std::optional<T>& value) {
+  return value ? Json(*value) : Json();
 }
 
 bool has_modes(std::int8_t status) {
@@ -61,11 +60,11 @@ void Alarms::take(const sampled_modes_t& message) {
   smallest_margin = std::min(smallest_margin.value_or(message.gain_margin), message.gain_margin);
 }
 
-FrameJson Frame::json() const {
-  FrameJson document{{"utime", utime}, {"messages", messages}, {"age", age}};
-  document["state"] = state ? message_json(*state) : FrameJson();
-  document["modes"] = modes ? message_json(*modes) : FrameJson();
-  document["sampled"] = sampled ? message_json(*sampled) : FrameJson();
+Json Frame::json() const {
+  Json document{{"utime", utime}, {"messages", messages}, {"age", age}};
+  document["state"] = state ? message_json(*state) : Json();
+  document["modes"] = modes ? message_json(*modes) : Json();
+  document["sampled"] = sampled ? message_json(*sampled) : Json();
   document["alarms"] = {{"smallest_ratio", or_null(alarms.smallest_ratio)},
                         {"changes_of_ratio", alarms.changes_of_ratio},
                         {"worst_utime", alarms.worst_utime},
@@ -77,8 +76,8 @@ FrameJson Frame::json() const {
   return document;
 }
 
-std::string line_of(const FrameJson& document) {
-  return document.dump(-1, ' ', false, FrameJson::error_handler_t::replace);
+std::string line_of(const Json& document) {
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace dashpot::apps

@@ -1,3 +1,4 @@
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/web/receptance.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/settings.hpp>
@@ -15,7 +16,6 @@ namespace dashpot::apps {
 using controller::InputError;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using ReceptanceJson = nlohmann::ordered_json;
 
 MatrixXd consistent_inverse(const MatrixXd& M, const MatrixXd& J) {
   const Eigen::LLT<MatrixXd> mass(M);
@@ -38,11 +38,10 @@ Place place_of(const std::string& place, const MatrixXd& M, const MatrixXd& J) {
   return {J.row(i), consistent_inverse(M, J).col(i), i < 3 ? "m/N" : "rad/(N m)"};
 }
 
-ReceptanceJson receptance_json(const analysis::System<>& system,
-                               const analysis::Spectrum<>& spectrum, const Eigen::RowVectorXd& row,
-                               const std::string& unit) {
+Json receptance_json(const analysis::System<>& system, const analysis::Spectrum<>& spectrum,
+                     const Eigen::RowVectorXd& row, const std::string& unit) {
   double slowest = 10, fastest = 10;
-  ReceptanceJson natural = ReceptanceJson::array();
+  Json natural = Json::array();
   for (const analysis::Mode<>& mode : spectrum.modes) {
     const double frequency = mode.natural_frequency;
     natural.push_back(frequency);

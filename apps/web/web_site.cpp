@@ -1,3 +1,4 @@
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/web/web_site.hpp>
 
 #include <cmath>
@@ -10,9 +11,7 @@
 namespace dashpot::apps {
 namespace {
 
-using SiteJson = nlohmann::ordered_json;
-
-HttpAnswer json_answer(const SiteJson& document) {
+HttpAnswer json_answer(const Json& document) {
   return {200, "application/json", std::make_shared<const std::string>(line_of(document))};
 }
 
@@ -30,19 +29,19 @@ std::string value_of(const std::map<std::string, std::string>& query, const std:
 }  // namespace
 
 WebSite::WebSite(std::string source, std::optional<ArmView> arm, std::unique_ptr<LogFrames> log,
-                 SiteJson identified)
+                 Json identified)
     : source_(std::move(source)),
       arm_(std::move(arm)),
       log_(std::move(log)),
       identified_(std::move(identified)) {}
 
-SiteJson WebSite::setup() const {
-  SiteJson document{{"source", source_}, {"live", live()}};
-  document["duration"] = live() ? SiteJson() : SiteJson(log_->duration());
+Json WebSite::setup() const {
+  Json document{{"source", source_}, {"live", live()}};
+  document["duration"] = live() ? Json() : Json(log_->duration());
   document["damage"] = live() ? "" : log_->damage();
-  document["arm"] = arm_ ? arm_->chain() : SiteJson();
-  document["period"] = arm_ ? SiteJson(arm_->period()) : SiteJson();
-  document["gain_margin"] = arm_ ? SiteJson(arm_->gain_margin()) : SiteJson();
+  document["arm"] = arm_ ? arm_->chain() : Json();
+  document["period"] = arm_ ? Json(arm_->period()) : Json();
+  document["gain_margin"] = arm_ ? Json(arm_->gain_margin()) : Json();
   document["wanted_ratio"] = {{"joint", arm_ ? arm_->wanted_ratio(state_t::JOINT) : 0},
                               {"cartesian", arm_ ? arm_->wanted_ratio(state_t::CARTESIAN) : 0}};
   document["identified"] = identified_;
@@ -96,7 +95,7 @@ HttpAnswer WebSite::answer(const std::string& path,
 
 std::shared_ptr<const std::string> WebSite::next_event() {
   const auto now = std::chrono::steady_clock::now();
-  SiteJson document;
+  Json document;
   {
     const std::lock_guard lock(mutex_);
     if (frame_.messages == sent_ && now - sent_at_ < std::chrono::seconds(1)) return nullptr;

@@ -1,7 +1,7 @@
 #include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/model/least_inertia.hpp>
-#include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/posture.hpp>
 
 #include <Eigen/Cholesky>
 #include <algorithm>

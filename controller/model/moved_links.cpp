@@ -4,11 +4,10 @@
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
 #include <dashpot/controller/model/moved_links.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <tuple>
 
@@ -18,12 +17,6 @@ namespace {
 /// Share of the chain's moments of inertia that cannot matter: half of it is in frequencies.
 constexpr double kNegligible = 1e-4;
 constexpr std::size_t kShownLinks = 10;
-
-std::string figure(double value) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", value);
-  return text.data();
-}
 
 std::string quoted(const std::string& link) {
   return "link '" + link + "'";
@@ -79,8 +72,8 @@ void doubt_masses(const RobotModel& model, const std::vector<MovedLink>& links,
     if (!link) continue;
     const double mass = link->body.body.getMass(), share = mass / middle;
     if (mass == 0 || (share < kTimes && share > kPart)) continue;
-    warnings.push_back(one_line(quoted(link->body.link) + ": its mass, " + figure(mass) +
-                                " kg, is " + figure(share) +
+    warnings.push_back(one_line(quoted(link->body.link) + ": its mass, " + text::number(mass, 4) +
+                                " kg, is " + text::number(share, 4) +
                                 " times that of an ordinary link of this arm" +
                                 (share > 1 ? ": is it in g?" : ": is it in kg?")));
   }
@@ -96,11 +89,11 @@ void doubt_inertias(const RobotModel& model, const std::vector<MovedLink>& links
   for (const MovedLink& link : links) {
     const double mass = link.body.body.getMass();
     if (!(link.body.moment > mass * most * most) || link.body.moment < 1e-3 * moments) continue;
-    warnings.push_back(one_line(quoted(link.body.link) + ": its inertia, " +
-                                figure(link.body.moment) + " kg m^2, with its mass, " +
-                                figure(mass) +
-                                " kg, is that of a body larger than the arm, whose " +
-                                "links add up to " + figure(reach) + " m: is it in kg m^2?"));
+    warnings.push_back(
+        one_line(quoted(link.body.link) + ": its inertia, " + text::number(link.body.moment, 4) +
+                 " kg m^2, with its mass, " + text::number(mass, 4) +
+                 " kg, is that of a body larger than the arm, whose " + "links add up to " +
+                 text::number(reach, 4) + " m: is it in kg m^2?"));
   }
 }
 
@@ -124,9 +117,10 @@ void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, d
   constexpr double kArm = 0.5;     // m: a smaller arm may carry things as large as this
   constexpr double kMiddle = 0.5;  // of the reach
   constexpr double kLeast = 1e-3;  // likewise
-  const std::string beside = " m, the arm reaches " + figure(reach) + " m: ";
+  const std::string beside = " m, the arm reaches " + text::number(reach, 4) + " m: ";
   const auto doubt = [&](const std::string& what, double size, const char* question) {
-    if (size > std::max(reach, kArm)) warnings.push_back(what + figure(size) + beside + question);
+    if (size > std::max(reach, kArm))
+      warnings.push_back(what + text::number(size, 4) + beside + question);
   };
   const Attachment& attached = model.attachment();
   const Payload payload = attached.payload();
@@ -140,8 +134,8 @@ void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, d
   }
   const double size = middle_size(links);
   if (size > kMiddle * reach || (size >= 0 && size < kLeast * reach)) {
-    warnings.push_back("links: their masses and inertias are those of bodies of " + figure(size) +
-                       beside + "are inertias in kg m^2?");
+    warnings.push_back("links: their masses and inertias are those of bodies of " +
+                       text::number(size, 4) + beside + "are inertias in kg m^2?");
   }
 }
 
@@ -187,8 +181,9 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
     const double rotor = joint.reflected_inertia;
     const bool large = mass > 0 && rotor > kRotors * mass * std::max(1.0, reach * reach);
     if (large || (rotor > 0 && bare)) {
-      doubt(joint, "reflected inertia, " + figure(rotor) + " kg m^2, is hardly one of an arm of " +
-                       figure(mass) + " kg, " + figure(reach) + " m long: is it " +
+      doubt(joint, "reflected inertia, " + text::number(rotor, 4) +
+                       " kg m^2, is hardly one of an arm of " + text::number(mass, 4) + " kg, " +
+                       text::number(reach, 4) + " m long: is it " +
                        (large ? "in kg m^2?"
                               : "that of the motor, to be multiplied by the gear ratio's square?"));
     }
@@ -196,18 +191,19 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
          {std::tuple("viscous", joint.viscous_friction, joint.viscous_friction * joint.velocity),
           {"Coulomb", joint.coulomb_friction, joint.coulomb_friction}}) {
       if (!std::isfinite(friction) || friction <= kFriction * joint.effort) continue;
-      doubt(joint, std::string(kind) + " friction, " + figure(told) + ", takes " +
-                       figure(friction) + " N m, its effort limit is " + figure(joint.effort) +
-                       " N m: is it in N m and N m s/rad?");
+      doubt(joint, std::string(kind) + " friction, " + text::number(told, 4) + ", takes " +
+                       text::number(friction, 4) + " N m, its effort limit is " +
+                       text::number(joint.effort, 4) + " N m: is it in N m and N m s/rad?");
     }
     limit(joint, std::max(-joint.lower, joint.upper), kTurn,
-          "position, " + figure(joint.lower) + " to " + figure(joint.upper) +
+          "position, " + text::number(joint.lower, 4) + " to " + text::number(joint.upper, 4) +
               " rad, is many turns: is it in deg?");
     limit(joint, joint.velocity, kSpeed,
-          "velocity, " + figure(joint.velocity) +
+          "velocity, " + text::number(joint.velocity, 4) +
               " rad/s, is hardly one of an arm: is it in deg/s or rpm?");
     limit(joint, joint.effort, kEffort,
-          "effort, " + figure(joint.effort) + " N m, is hardly one of an arm: is it in N m?");
+          "effort, " + text::number(joint.effort, 4) +
+              " N m, is hardly one of an arm: is it in N m?");
   }
 }
 
@@ -241,14 +237,14 @@ void doubt_weight(const RobotModel& model, const std::vector<MovedLink>& links,
   const bool carried = payload > (link ? link->body.body.getMass() : 0);
   if (!link && !carried) return;
   const char* unit = joint.type == JointType::kPrismatic ? " N" : " N m";
-  warnings.push_back(
-      one_line((carried ? "payload: its mass, " + figure(payload) + " kg, and the"
-                        : quoted(link->body.link) + ": its mass, " +
-                              figure(link->body.body.getMass()) + " kg, and the other") +
-               " links that joint '" + joint.name + "' moves take " + figure(weight[worst]) + unit +
-               " to hold, " + figure(weight[worst] / joint.effort) + " times the effort limit, " +
-               figure(joint.effort) + unit + (carried ? ": is it in g" : ": are masses in g") +
-               ", or is the limit not in" + unit + "?"));
+  warnings.push_back(one_line(
+      (carried ? "payload: its mass, " + text::number(payload, 4) + " kg, and the"
+               : quoted(link->body.link) + ": its mass, " +
+                     text::number(link->body.body.getMass(), 4) + " kg, and the other") +
+      " links that joint '" + joint.name + "' moves take " + text::number(weight[worst], 4) + unit +
+      " to hold, " + text::number(weight[worst] / joint.effort, 4) + " times the effort limit, " +
+      text::number(joint.effort, 4) + unit + (carried ? ": is it in g" : ": are masses in g") +
+      ", or is the limit not in" + unit + "?"));
 }
 
 }  // namespace
@@ -283,7 +279,7 @@ void check_links(const std::vector<MovedLink>& links, const ModelOptions& option
     }
     if (own.possible && own.moment < kNegligible * moments) {
       warnings.push_back(one_line(quoted(own.link) + ": " + own.problem + "; it is " +
-                                  figure(own.moment / moments) +
+                                  text::number(own.moment / moments, 4) +
                                   " of the arm's inertia, and cannot matter"));
       continue;
     }
@@ -307,12 +303,13 @@ void doubt_units(const RobotModel& model, const std::vector<MovedLink>& links,
   constexpr double kGravity = 30, kWeak = 1.5;  // m/s^2: beyond the planets, below the Moon
   const double reach = reach_of(bare, model.joints());
   if (reach > kLongArm) {
-    warnings.push_back("links: they add up to " + figure(reach) + " m: are lengths in mm?");
+    warnings.push_back("links: they add up to " + text::number(reach, 4) +
+                       " m: are lengths in mm?");
     return;
   }
   const double gravity = model.gravity().norm();
   if (gravity > kGravity || (gravity > 0 && gravity < kWeak)) {
-    warnings.push_back("gravity: " + figure(gravity) +
+    warnings.push_back("gravity: " + text::number(gravity, 4) +
                        " m/s^2 is that of no planet: is it in m/s^2?");
   }
   doubt_massless(model, warnings);

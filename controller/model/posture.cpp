@@ -1,5 +1,4 @@
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/posture.hpp>
 
 #include <Eigen/SVD>

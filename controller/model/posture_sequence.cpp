@@ -1,4 +1,4 @@
-#include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/posture.hpp>
 
 #include <algorithm>
 #include <cmath>

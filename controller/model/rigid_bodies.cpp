@@ -1,11 +1,10 @@
 #include <dashpot/controller/model/rigid_bodies.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace dashpot::controller {
 namespace {
@@ -14,19 +13,11 @@ constexpr double kInertiaRounding = 0.005;  // of published inertias, relative
 constexpr double kSmallest = 1e-12;         // squared radius of gyration that counts, m^2
 constexpr double kLightest = 1e-6;          // kg
 
-std::string number_text(double value) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.6g", value);
-  return text.data();
-}
-
 /// By how much the largest moment exceeds the sum of the others: " by 8.6 %", or " far".
 std::string excess_text(const Eigen::Vector3d& moments) {
   const double excess = moments[2] / (moments[0] + moments[1]) - 1;
   if (!(excess > 0 && excess < 10)) return " far";
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), " by %.3g %%", 100 * excess);
-  return text.data();
+  return " by " + text::number(100 * excess, 3) + " %";
 }
 
 KDL::RigidBodyInertia make_body(double mass, const Eigen::Vector3d& center,
@@ -60,7 +51,7 @@ std::string mass_problem(double mass, const Eigen::Vector3d& center,
   if (!std::isfinite(mass)) return "its mass is not a finite number";
   if (!center.allFinite()) return "its centre of mass is not finite";
   if (!inertia.allFinite()) return "its inertia is not finite";
-  if (mass < 0) return "its mass is negative, " + number_text(mass) + " kg";
+  if (mass < 0) return "its mass is negative, " + text::number(mass) + " kg";
   return "";
 }
 
@@ -72,12 +63,12 @@ std::string inertia_problem(double mass, const Eigen::Matrix3d& inertia) {
       kInertiaRounding * moments.cwiseAbs().maxCoeff() + kSmallest * std::max(mass, kLightest);
   if (moments[0] < -rounding) {
     return "its inertia is not positive definite: a principal moment is " +
-           number_text(moments[0]) + " kg m^2";
+           text::number(moments[0]) + " kg m^2";
   }
   if (moments[2] > moments[0] + moments[1] + rounding) {
     return "its inertia breaks the triangle inequality" + excess_text(moments) +
-           ": principal moments " + number_text(moments[0]) + ", " + number_text(moments[1]) +
-           ", " + number_text(moments[2]) + " kg m^2";
+           ": principal moments " + text::number(moments[0]) + ", " + text::number(moments[1]) +
+           ", " + text::number(moments[2]) + " kg m^2";
   }
   return "";
 }

@@ -434,7 +434,7 @@ RobotModel RobotModel::with_reflected_inertia(const JointVector& inertia) const 
 
 RobotModel RobotModel::from_urdf_file(const std::string& path, const std::string& base,
                                       const std::string& tip, const ModelOptions& options) {
-  return from_urdf_text(read_text(path), base, tip, options, path);
+  return from_urdf_text(read_urdf_file(path), base, tip, options, path);
 }
 
 }  // namespace dashpot::controller

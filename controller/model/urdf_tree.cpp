@@ -142,7 +142,7 @@ std::string links_near(const std::string& name, const urdf::ModelInterface& tree
   return text;
 }
 
-std::string read_text(const std::string& path) try {
+std::string read_urdf_file(const std::string& path) try {
   return text::read_file(path, text::kLargestXml);
 } catch (const std::runtime_error& error) {
   throw InvalidModel(one_line(path + ": " + error.what()));

@@ -31,8 +31,4 @@ UrdfTree read_urdf(const std::string& text, const std::string& name);
 /// are a, b", or, if there are more than ten, "the nearest of its 30 links are ...".
 std::string links_near(const std::string& name, const urdf::ModelInterface& tree);
 
-/// Returns the text of a file, which must be a regular file. Throws InvalidModel if it cannot be
-/// read.
-std::string read_text(const std::string& path);
-
 }  // namespace dashpot::controller

@@ -5,12 +5,12 @@
 #include <dashpot/controller/safety/brake.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/settings_check.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 #include <string_view>
 #include <tuple>
 #include <vector>
@@ -20,16 +20,10 @@ namespace {
 
 constexpr double kLongStop = 0.5;  // s, ten times as long as by default
 
-std::string number(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
-
 [[noreturn]] void fail(const std::string& key, double value, const std::string& unit,
                        const std::string& reason) {
-  throw InvalidSettings(key,
-                        "is " + number(value) + (unit.empty() ? "" : " ") + unit + ", " + reason);
+  throw InvalidSettings(
+      key, "is " + text::number(value) + (unit.empty() ? "" : " ") + unit + ", " + reason);
 }
 
 /// Checks the sizes and ranges of the settings that the table has.
@@ -62,7 +56,7 @@ class RangeCheck {
  private:
   static void check(const Setting& setting, const std::string& key, double value) {
     if (value == setting.none || setting.range.has(value)) return;
-    throw InvalidSettings(key, complaint(setting.range, value, setting.unit));
+    throw InvalidSettings(key, text::complaint(setting.range, value, setting.unit));
   }
 
   Eigen::Index n_;
@@ -167,15 +161,15 @@ class ScaleCheck {
     const bool stated = std::isfinite(most) && (more > 0 || most > 0);
     if (!stated || value <= (more > 0 ? most + more : kShare * most)) return;
     const std::string in = unit.empty() ? "" : " " + std::string(unit);
-    std::string text =
-        "is " + number(sign * value) + in + ", beyond " + what + number(sign * most) + in;
+    std::string text = "is " + text::number(sign * value) + in + ", beyond " + what +
+                       text::number(sign * most) + in;
     for (const OtherUnit& other : kOtherUnits) {
       if (other.unit != unit || !(other.size * std::abs(value) <= 2 * std::abs(most))) {
         continue;
       }
       text += "; is it in " + std::string(other.meant) + "? Write '" +
-              (other.meant == "%" ? number(other.size * value)
-                                  : number(sign * value) + " " + std::string(other.meant)) +
+              (other.meant == "%" ? text::number(other.size * value)
+                                  : text::number(sign * value) + " " + std::string(other.meant)) +
               "'";
     }
     throw InvalidSettings(std::string(key), text + "; limits.beyond_model: true accepts it");
@@ -188,7 +182,8 @@ class ScaleCheck {
 void need_at_most(const char* key, double value, double periods, double period) {
   if (value <= periods * period) return;
   fail(key, value, "s",
-       "must be at most " + number(periods) + " periods, " + number(periods * period) + " s");
+       "must be at most " + text::number(periods) + " periods, " + text::number(periods * period) +
+           " s");
 }
 
 void check_walls(const std::vector<Wall>& walls) {
@@ -223,17 +218,17 @@ std::string little_damping(const std::string& of, const std::string& unit,
   const double d = damping.head(stiffness.size()).maxCoeff(), k = stiffness.maxCoeff();
   const bool ratios = damping.minCoeff() > 0 && damping.maxCoeff() <= kMostRatio;
   if (!ratios || d >= kLeast * 2 * std::sqrt(k)) return "";
-  return of + " damping: " + number(d) + " is little beside a stiffness of " + number(k) + " " +
-         unit + ": is it a damping ratio?";
+  return of + " damping: " + text::number(d) + " is little beside a stiffness of " +
+         text::number(k) + " " + unit + ": is it a damping ratio?";
 }
 
 }  // namespace
 
 std::string soft_stiffness(const Gains& gains) {
-  constexpr double kSoft = 5;  // N/m
+  constexpr double kSlack = 5;  // N/m
   const double k = gains.task_stiffness.diagonal().head<3>().maxCoeff();
-  if (!(k > 0 && k < kSoft)) return "";
-  return "task stiffness: " + number(k) + " N/m hardly holds a tip: is it in N/mm?";
+  if (!(k > 0 && k < kSlack)) return "";
+  return "task stiffness: " + text::number(k) + " N/m hardly holds a tip: is it in N/mm?";
 }
 
 std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains) {
@@ -250,8 +245,8 @@ std::vector<std::string> doubtful_gains(double reach, const Gains& gains,
        {std::tuple("stiffness", "N", &K), {"damping", "N s", &D}}) {
     const double move = entries->head<3>().maxCoeff(), turn = entries->tail<3>().maxCoeff();
     if (!(move > 0) || turn <= 4 * reach * reach * move || (entries == &D && !damped)) continue;
-    said.push_back(std::string("task ") + name + ": " + number(turn) + " " + of +
-                   " m/rad against rotation is much beside " + number(move) + " " + of +
+    said.push_back(std::string("task ") + name + ": " + text::number(turn) + " " + of +
+                   " m/rad against rotation is much beside " + text::number(move) + " " + of +
                    "/m against translation, which stands first: is the order another?");
   }
   said.push_back(soft_stiffness(gains));
@@ -307,7 +302,8 @@ void validate(const Settings& settings, const RobotModel& model) {
   const Watchdog& watchdog = settings.watchdog;
   if (watchdog.setpoint_damp > 0 && watchdog.setpoint_damp < watchdog.setpoint_hold) {
     fail("watchdog.setpoint_damp", watchdog.setpoint_damp, "s",
-         "before setpoint_hold, " + number(watchdog.setpoint_hold) + " s, which would never come");
+         "before setpoint_hold, " + text::number(watchdog.setpoint_hold) +
+             " s, which would never come");
   }
   if (!(settings.watchdog.longest_gap > settings.period)) {
     fail("watchdog.longest_gap", settings.watchdog.longest_gap, "s", "has to exceed the period");
@@ -316,8 +312,8 @@ void validate(const Settings& settings, const RobotModel& model) {
   const bool late = loop_lag(settings) > 2 * settings.period;  // and not merely a slow loop
   if (late && stopping > std::max(kLongStop, 1.01 * limits.stopping_time)) {
     fail("limits.stopping_time", limits.stopping_time, "s",
-         "but a loop whose torque is " + number(loop_lag(settings)) +
-             " s late (analysis.sampled) needs " + number(stopping) +
+         "but a loop whose torque is " + text::number(loop_lag(settings)) +
+             " s late (analysis.sampled) needs " + text::number(stopping) +
              " s: ask for that, or for less delay and a higher cutoff");
   }
   check_initial(settings.initial, n);

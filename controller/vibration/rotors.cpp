@@ -3,9 +3,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <exception>
 #include <sstream>
 
@@ -21,9 +19,7 @@ const Joint& joint_of(const RobotModel& model, int i) {
 /// Two digits, rounded up: what is told is enough.
 std::string rounded_up(double value) {
   const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.2g", unit * std::ceil(value / unit - 1e-9));
-  return text.data();
+  return text::number(unit * std::ceil(value / unit - 1e-9), 2);
 }
 
 }  // namespace
