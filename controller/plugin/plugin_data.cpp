@@ -1,4 +1,5 @@
 #include <dashpot/controller/plugin/plugin_data.hpp>
+#include <dashpot/controller/plugin_fields.hpp>
 
 #include <algorithm>
 
@@ -6,7 +7,6 @@ namespace dashpot::controller {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 Eigen::Map<const Eigen::VectorXd> vector(const double* data, int size) noexcept {
   return {data, size};
@@ -16,20 +16,33 @@ Eigen::Map<const RowMajor> square(const double* data, int size) noexcept {
   return {data, size, size};
 }
 
-template <class Vector>
-void put(const Vector& from, double* to) noexcept {
-  std::copy_n(from.data(), from.size(), to);
-}
+/// Copies fields into those of C structs, matrices row by row.
+struct ToC {
+  template <class From, class To>
+  void operator()(const From& from, To& to) const noexcept {
+    if constexpr (std::is_array_v<To>) {
+      Eigen::Map<RowMajor>(to, from.rows(), from.cols()) = from;
+    } else {
+      to = static_cast<To>(from);
+    }
+  }
+  void shape(const VibrationMode& from, dashpot_mode& to) const noexcept {
+    for (std::size_t k = 0; k < 2; ++k) {
+      to.eigenvalues[k][0] = from.eigenvalues[k].real();
+      to.eigenvalues[k][1] = from.eigenvalues[k].imag();
+    }
+    for (Eigen::Index k = 0; k < from.shape.size(); ++k) {
+      to.shape_real[k] = from.shape[k].real();
+      to.shape_imag[k] = from.shape[k].imag();
+    }
+  }
+};
 
-void put(const Pose& from, double* position, double* rotation) noexcept {
-  put(from.position, position);
-  Eigen::Map<RowMajor3>(rotation, 3, 3) = from.rotation;
-}
-
-/// Row by row.
-template <class Matrix>
-void put_rows(const Matrix& from, double* to) noexcept {
-  Eigen::Map<RowMajor>(to, from.rows(), from.cols()) = from;
+template <class Struct>
+void start(Eigen::Index joints, Struct& out) noexcept {
+  out = {};
+  out.struct_size = sizeof out;
+  out.joints = static_cast<std::uint32_t>(joints);
 }
 
 template <class Struct>
@@ -164,121 +177,38 @@ std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept 
 }
 
 void to_c(const DynamicsResult& dynamics, dashpot_dynamics& out) noexcept {
-  out = {};
-  out.struct_size = sizeof out;
-  out.joints = static_cast<std::uint32_t>(dynamics.gravity.size());
-  put_rows(dynamics.M, out.mass);
-  put(dynamics.coriolis, out.coriolis);
-  put(dynamics.gravity, out.gravity);
-  put_rows(dynamics.J, out.jacobian);
-  put(dynamics.Jdot_qd, out.jacobian_dot_qd);
-  put({dynamics.p_BT_B, dynamics.R_BT}, out.tip_position, out.tip_rotation);
+  start(dynamics.gravity.size(), out);
+  constexpr ToC kCopy;
+  kCopy(dynamics.M, out.mass);
+  kCopy(dynamics.coriolis, out.coriolis);
+  kCopy(dynamics.gravity, out.gravity);
+  kCopy(dynamics.J, out.jacobian);
+  kCopy(dynamics.Jdot_qd, out.jacobian_dot_qd);
+  kCopy(dynamics.p_BT_B, out.tip_position);
+  kCopy(dynamics.R_BT, out.tip_rotation);
 }
 
 void to_c(const analysis::System<kMaxJoints>& system, dashpot_closed_loop& out) noexcept {
-  out = {};
-  out.struct_size = sizeof out;
-  out.joints = static_cast<std::uint32_t>(system.mass.rows());
-  put_rows(system.mass, out.mass);
-  put_rows(system.damping, out.damping);
-  put_rows(system.stiffness, out.stiffness);
+  start(system.mass.rows(), out);
+  constexpr ToC kCopy;
+  kCopy(system.mass, out.mass);
+  kCopy(system.damping, out.damping);
+  kCopy(system.stiffness, out.stiffness);
 }
 
 void to_c(const Snapshot& snapshot, dashpot_snapshot& out) noexcept {
-  out = {};
-  out.struct_size = sizeof out;
-  out.joints = static_cast<std::uint32_t>(snapshot.torque.size());
-  out.time = snapshot.time;
-  out.tick = snapshot.tick;
-  out.restarts = snapshot.restarts;
-  out.status = static_cast<std::int32_t>(snapshot.status);
-  out.fault = static_cast<std::int32_t>(snapshot.fault);
-  out.mode = static_cast<std::int32_t>(snapshot.mode);
-  put(snapshot.position, out.position);
-  put(snapshot.velocity, out.velocity);
-  put(snapshot.torque, out.torque);
-  put(snapshot.reference_position, out.reference_joint_position);
-  put(snapshot.tip, out.tip_position, out.tip_rotation);
-  put(snapshot.reference_tip, out.reference_tip_position, out.reference_tip_rotation);
-  put(snapshot.law_torque, out.law_torque);
-  put(snapshot.tip_error, out.tip_error);
-  put(snapshot.tip_wrench, out.tip_wrench);
-  out.joint_damping_ratio = snapshot.joint_damping_ratio;
-  out.task_damping_ratio = snapshot.task_damping_ratio;
-  out.damping_level = snapshot.damping_level;
-  out.payload_mass = snapshot.payload.mass;
-  put(snapshot.payload.center, out.payload_center);
-  put_rows(snapshot.payload.inertia, out.payload_inertia);
-  put(snapshot.tool, out.tool_position, out.tool_rotation);
+  start(snapshot.torque.size(), out);
+  copy_fields(snapshot, out, ToC{});
 }
 
 void to_c(const Vibration& vibration, dashpot_modes& out) noexcept {
-  out = {};
-  out.struct_size = sizeof out;
-  out.joints = static_cast<std::uint32_t>(vibration.position.size());
-  out.time = vibration.time;
-  out.tick = vibration.tick;
-  put(vibration.position, out.position);
-  out.status = static_cast<std::int32_t>(vibration.status);
-  out.zero_modes = static_cast<std::uint32_t>(vibration.zero_modes);
-  out.count = static_cast<std::uint32_t>(vibration.count);
-  out.origin = static_cast<std::int32_t>(vibration.origin);
-  const VibrationCounters& counters = vibration.counters;
-  out.tracked = counters.tracked;
-  out.reused = counters.reused;
-  out.direct = counters.direct;
-  out.unchanged = counters.unchanged;
-  out.no_springs = counters.no_springs;
-  out.failed = counters.failed;
-  out.missed = counters.missed;
-  out.no_zero_modes = counters.no_zero_modes;
-  out.no_wrench = counters.no_wrench;
-  out.no_shapes = counters.no_shapes;
-  out.at_rest = counters.at_rest;
-  for (std::uint32_t i = 0; i < out.count; ++i) {
-    const VibrationMode& from = vibration.modes[i];
-    dashpot_mode& to = out.modes[i];
-    to.natural_frequency = from.natural_frequency;
-    to.natural_frequency_bound = from.natural_frequency_bound;
-    to.damping_ratio = from.damping_ratio;
-    to.damping_ratio_bound = from.damping_ratio_bound;
-    to.damped_frequency = from.damped_frequency;
-    for (std::size_t k = 0; k < 2; ++k) {
-      to.eigenvalues[k][0] = from.eigenvalues[k].real();
-      to.eigenvalues[k][1] = from.eigenvalues[k].imag();
-    }
-    to.eigenvalue_bound = from.error_bound;
-    to.kind = static_cast<std::int32_t>(from.kind);
-    to.label = from.label;
-    for (Eigen::Index k = 0; k < from.shape.size(); ++k) {
-      to.shape_real[k] = from.shape[k].real();
-      to.shape_imag[k] = from.shape[k].imag();
-    }
-  }
+  start(vibration.position.size(), out);
+  copy_fields(vibration, out, ToC{});
 }
 
 void to_c(const SampledVibration& vibration, dashpot_sampled_modes& out) noexcept {
-  out = {};
-  out.struct_size = sizeof out;
-  out.joints = static_cast<std::uint32_t>(vibration.position.size());
-  out.time = vibration.time;
-  out.tick = vibration.tick;
-  put(vibration.position, out.position);
-  out.spectral_radius = vibration.spectral_radius;
-  out.gain_margin = vibration.gain_margin;
-  out.assumes = vibration.assumes;
-  out.status = static_cast<std::int32_t>(vibration.status);
-  out.count = static_cast<std::uint32_t>(vibration.count);
-  for (std::uint32_t i = 0; i < out.count; ++i) {
-    const SampledVibrationMode& from = vibration.modes[i];
-    out.modes[i] = {from.continuous_frequency,
-                    from.continuous_ratio,
-                    from.natural_frequency,
-                    from.damping_ratio,
-                    from.damped_frequency,
-                    static_cast<std::int32_t>(from.kind),
-                    0};
-  }
+  start(vibration.position.size(), out);
+  copy_fields(vibration, out, ToC{});
 }
 
 }  // namespace dashpot::controller

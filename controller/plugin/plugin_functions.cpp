@@ -186,7 +186,8 @@ dashpot_controller* dashpot_create_from_text(const char* text, const char* direc
     return nullptr;
   }
   return make_controller([&] {
-    return create_controller(read_config(parse_yaml(text), directory == nullptr ? "" : directory));
+    return create_controller(
+        read_config(dashpot::text::parse_yaml(text), directory == nullptr ? "" : directory));
   });
 }
 

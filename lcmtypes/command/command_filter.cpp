@@ -1,6 +1,6 @@
 #include <dashpot/lcmtypes/command/command_values.hpp>
 #include <dashpot/lcmtypes/command_filter.hpp>
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 
 #include <algorithm>
 #include <stdexcept>

@@ -1,5 +1,5 @@
 #include <dashpot/lcmtypes/log_file.hpp>
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 #include <dashpot/controller/robot_types.hpp>
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
+#include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
-#include <dashpot/lcmtypes/messages/message_check.hpp>
 
 #include <lcm/lcm-cpp.hpp>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/lcmtypes/publish/encode.hpp>
 
 #include <Eigen/Geometry>
