@@ -1,7 +1,8 @@
 #pragma once
+#include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/robot_description.hpp>
 #include <dashpot/controller/settings.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
+#include <dashpot/text/setting_reader.hpp>
 
 #include <array>
 #include <filesystem>
@@ -34,6 +35,31 @@ struct Config {
 Config load_config(const std::string& path);
 /// Reads a configuration from a parsed YAML file, as load_config does. A relative path of the URDF
 /// begins at `directory`. Errors do not name the file.
-Config read_config(const YamlNode& document, const std::filesystem::path& directory);
+Config read_config(const text::YamlNode& document, const std::filesystem::path& directory);
+
+/// The robot that `robot` describes; model() of it does not throw. A relative path of its URDF
+/// begins at `directory`, unless its `text` is known. Throws InputError.
+RobotDescription read_robot(const text::YamlMapping& root, const std::filesystem::path& directory,
+                            const std::string& text = "");
+
+/// Sets the options of payload, rotors, friction and gears under `keys`, of the joints of `model`.
+/// Throws InputError.
+void read_joint_options(const text::YamlMapping& keys, const RobotModel& model,
+                        ModelOptions& options);
+
+/// Returns the unit of a quantity of each joint: `revolute`, or `prismatic` for prismatic joints.
+text::Units joint_units(const RobotModel& model, const char* revolute, const char* prismatic);
+
+/// Whether stiffness and damping may be given one without the other.
+enum class GainPairs { kTogether, kEither };
+
+/// Sets those of `gains` that stand under the key `gains` of `parent`. Whether the matrices are
+/// possible is not checked. Throws InputError.
+void read_gains(const text::YamlMapping& parent, const RobotModel& model, GainPairs pairs,
+                Gains& gains);
+
+/// Returns the gains under the key `gains` of `parent`, one without the other. What is missing is
+/// zero. Throws InputError.
+Gains read_gains(const text::YamlMapping& parent, const RobotModel& model);
 
 }  // namespace dashpot::controller

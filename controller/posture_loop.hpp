@@ -58,12 +58,25 @@ inline constexpr double kSlowestVibration = 1;
 /// relative error of 1e-9. Allocates.
 Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector& q);
 
+/// Returns the springs and dampers of an environment, and of a load that adds `load_stiffness`.
+PassivePart passive_part(const Jacobian& J, const Environment& environment,
+                         const JointMatrix& load_stiffness) noexcept;
+
+/// Returns K_I (n x n, N m/(rad s)): the torque of the integral of these springs grows by -K_I q,
+/// K_I = (K_q + J' K_C J) / time. No entries if the time is zero: there is no integral.
+JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
+                               double time) noexcept;
+
 /// Returns the integral of springs with this K_I (n x n, N m/(rad s), symmetric positive
 /// semidefinite; see integral_stiffness) as states of the loop, as many as its rank: with K_I = F
 /// F',
 ///     w_k+1 = w_k + T F' q_k,   and the torque -F w_k.
 /// None if K_I has no entries.
 analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period);
+
+/// Returns at which rates, 1/s, the slow modes decay that the integral makes, the slowest first;
+/// negative: it grows.
+std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period);
 
 /// An arm as a sampled loop has it: all of the loop but the springs and dampers of the controller.
 class SampledArm {

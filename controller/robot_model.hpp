@@ -140,4 +140,8 @@ class RobotModel {
   std::shared_ptr<const Data> data_;
 };
 
+/// Returns the text of the URDF at `path`, which must be a regular file. Throws InvalidModel if it
+/// cannot be read.
+std::string read_urdf_file(const std::string& path);
+
 }  // namespace dashpot::controller

@@ -31,6 +31,16 @@ struct Pose {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
 };
 
+/// Returns diag(R, R) diag(mask) diag(R, R)' a, the part of the vector a (in B's axes) in the
+/// directions `mask` of the frame with the axes R.
+inline Vector6 part_along(const Vector6& mask, const Eigen::Matrix3d& R,
+                          const Vector6& a) noexcept {
+  Vector6 result;
+  result.head<3>() = R * mask.head<3>().cwiseProduct(R.transpose() * a.head<3>());
+  result.tail<3>() = R * mask.tail<3>().cwiseProduct(R.transpose() * a.tail<3>());
+  return result;
+}
+
 /// A body that the tip carries, in the axes of the tip link.
 struct Payload {
   double mass = 0;                                    ///< kg

@@ -7,9 +7,7 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/config.hpp>
-#include <dashpot/controller/config/config_gains.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
+#include <dashpot/text/yaml_document.hpp>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -23,7 +21,7 @@ using controller::AuditOptions;
 using controller::JointVector;
 using controller::Mode;
 using controller::RobotModel;
-using controller::Units;
+using text::Units;
 
 const Units kStiffness = {"N/m", "N/m", "N/m", "N m/rad", "N m/rad", "N m/rad"};
 const Units kDamping = {"N s/m", "N s/m", "N s/m", "N m s/rad", "N m s/rad", "N m s/rad"};
@@ -53,8 +51,8 @@ void take_preset(const std::string& name, int n, AuditOptions& audit) {
 
 /// Sets the gains that stand in a configuration file.
 void read_gains_file(const std::string& path, const RobotModel& model, AuditOptions& audit) try {
-  const controller::YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
-  const controller::YamlMapping root(document, "", controller::kConfigSections);
+  const text::YamlNode document = text::parse_yaml(text::read_regular_file(path));
+  const text::YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("gains")) throw InputError("gains", "missing");
   audit.gains = controller::read_gains(root, model);
 } catch (const InputError& error) {
@@ -73,7 +71,7 @@ Matrix factor_damping(const std::string& option, double factor, const Matrix& K)
 /// A diagonal of the task's gains. Throws InputError for an entry that is negative: such a damper
 /// feeds energy in, and such a spring pushes away.
 Eigen::VectorXd gain_diagonal(const std::string& option, const std::string& text,
-                              const controller::Units& units) {
+                              const text::Units& units) {
   Eigen::VectorXd values = parse_quantities(option, text, units);
   if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
   return values;

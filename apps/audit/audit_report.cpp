@@ -3,7 +3,7 @@
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/apps/report/text_table.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 
@@ -248,7 +248,7 @@ std::string audit_table(const AuditTask& task, const AuditReport& report) {
 
 std::string csv_heading(const controller::RobotModel& model) {
   std::string text = "posture";
-  const controller::Units units = controller::joint_units(model, "rad", "m");
+  const text::Units units = controller::joint_units(model, "rad", "m");
   for (std::size_t i = 0; i < units.size(); ++i) {
     text += ",q" + std::to_string(i + 1) + " [" + units[i] + "]";
   }

@@ -18,11 +18,11 @@ namespace dashpot::apps {
 namespace {
 
 using controller::Config;
-using controller::Estimate;
 using controller::Joint;
-using controller::JointCheck;
 using controller::JointVector;
-using controller::ModelCheck;
+using identification::Estimate;
+using identification::JointCheck;
+using identification::ModelCheck;
 
 struct CheckModelOptions {
   std::vector<std::string> files;
@@ -63,7 +63,7 @@ std::vector<ConfigChange> changes_for(const CheckModelOptions& options, const Co
        yaml_list(friction(check, &JointCheck::coulomb_friction,
                           config.model.joint_values(&Joint::coulomb_friction)))}};
   if (check.gravity) changes.push_back({{"robot", "gravity"}, yaml_list(*check.gravity)});
-  const controller::PayloadCheck& payload = check.payload;
+  const identification::PayloadCheck& payload = check.payload;
   const bool center = std::all_of(payload.center.begin(), payload.center.end(),
                                   [](const Estimate& one) { return one.determined; });
   if (payload.mass.determined && center) {
@@ -95,7 +95,7 @@ void write_config(const CheckModelOptions& options, const Config& config,
                      "robot.gravity fits: how is the base inclined?");
   }
   bool kept = true;
-  const std::string text = changed_config(controller::read_regular_file(options.config),
+  const std::string text = changed_config(text::read_regular_file(options.config),
                                           changes_for(options, config, check), kept);
   OutputFile file("--write", options.write);
   file.write(text);
@@ -106,7 +106,7 @@ void write_config(const CheckModelOptions& options, const Config& config,
 CheckModelReport check_files(const CheckModelOptions& options, const Config& config) {
   const EndOnSignal at_once("check-model");
   CheckModelReport report;
-  std::vector<controller::TorqueRecord> records;
+  std::vector<identification::TorqueRecord> records;
   for (const std::string& path : options.files) {
     show_progress(
         static_cast<double>(report.files.size()) / static_cast<double>(options.files.size() + 1),
@@ -125,7 +125,7 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
       static_cast<double>(report.files.size()) / static_cast<double>(options.files.size() + 1),
       "comparing torques");
   try {
-    report.check = controller::check_model(config.robot, records);
+    report.check = identification::check_model(config.robot, records);
   } catch (const controller::InvalidModel&) {
     throw;
   } catch (const std::invalid_argument& error) {

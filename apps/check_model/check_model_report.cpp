@@ -12,10 +12,10 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::Estimate;
-using controller::JointCheck;
-using controller::ModelCheck;
-using controller::TorqueKind;
+using identification::Estimate;
+using identification::JointCheck;
+using identification::ModelCheck;
+using identification::TorqueKind;
 using Align = TextTable::Align;
 
 /// "12.345 +- 0.012": two digits of the deviation, and as many of the value; "?" if the records do
@@ -120,7 +120,7 @@ std::string check_model_table(const CheckModelReport& report) {
   if (!check.ambiguities.empty()) text += "\nNot told apart\n";
   for (const std::string& one : check.ambiguities) text += "  " + one + "\n";
   if (!check.contacts.empty()) text += "\nLeft out, as other forces acted\n";
-  for (const controller::LeftOut& one : check.contacts) {
+  for (const identification::LeftOut& one : check.contacts) {
     text += "  " + report.files[static_cast<std::size_t>(one.record)] + ": " +
             format_number(one.from, 4) + " to " + format_number(one.to, 4) + " s\n";
   }
@@ -158,7 +158,7 @@ Json check_model_json(const CheckModelReport& report) {
     determined = determined &&
                  (one.determined || check.payload.mass.value < 3 * check.payload.mass.deviation);
   }
-  for (const controller::LeftOut& one : check.contacts) {
+  for (const identification::LeftOut& one : check.contacts) {
     left_out.push_back({{"file", report.files[static_cast<std::size_t>(one.record)]},
                         {"from", one.from},
                         {"to", one.to}});

@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/controller/check_model.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/identification/check_model.hpp>
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -9,7 +9,7 @@
 namespace dashpot::apps {
 
 struct CheckModelReport {
-  controller::ModelCheck check;
+  identification::ModelCheck check;
   std::vector<std::string> files;
   std::vector<std::string> joints;  ///< names
   std::vector<std::string> notes;

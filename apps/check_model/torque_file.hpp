@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/apps/records/recorded_motion.hpp>
-#include <dashpot/controller/check_model.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/identification/check_model.hpp>
 
 #include <string>
 #include <vector>
@@ -10,7 +10,7 @@ namespace dashpot::apps {
 
 /// A record of positions and torques, and which columns they are.
 struct TorqueFile {
-  controller::TorqueRecord record;
+  identification::TorqueRecord record;
   std::vector<std::string> positions, torques;  ///< names, in the model's order
   std::vector<std::string> notes;
 };

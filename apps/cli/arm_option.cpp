@@ -2,7 +2,7 @@
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/controller/attachment.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/rotors.hpp>
 
@@ -14,7 +14,7 @@ namespace dashpot::apps {
 namespace {
 
 using controller::RobotModel;
-using controller::Units;
+using text::Units;
 
 /// One for each unit, or nothing if there is no text.
 std::optional<Eigen::VectorXd> quantities(const std::string& option, const std::string& text,

@@ -1,7 +1,7 @@
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/settings_check.hpp>

@@ -1,11 +1,10 @@
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/yaml/quantity.hpp>
+#include <dashpot/text/printable.hpp>
+#include <dashpot/text/quantity.hpp>
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <optional>
 #include <sstream>
@@ -16,7 +15,7 @@ namespace dashpot::apps {
 namespace {
 
 using controller::InputError;
-using controller::Units;
+using text::Units;
 
 std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> words;
@@ -39,10 +38,10 @@ std::vector<std::string> split(const std::string& text) {
 }
 
 double parse(const std::string& option, const std::string& word, const std::string& unit,
-             double none = controller::kNoNone) {
+             double none = text::kNoNone) {
   if (!std::isnan(none) && word == "none") return none;
   try {
-    return controller::parse_quantity(word, unit);
+    return text::parse_quantity(word, unit);
   } catch (const std::invalid_argument& error) {
     throw InputError(option, error.what());
   }
@@ -61,7 +60,7 @@ Eigen::VectorXd parse_quantities(const std::string& option, const std::string& t
     values[static_cast<Eigen::Index>(i)] = parse(option, words[i], units[i]);
   }
   try {
-    controller::refuse_mixed_angles(words, units);
+    text::refuse_mixed_angles(words, units);
   } catch (const std::invalid_argument& error) {
     throw InputError(option, error.what());
   }
@@ -87,7 +86,7 @@ CLI::Validator quantity(const std::string& unit, double least, double most,
                         const std::string& what) {
   const auto value_of = [=](const std::string& text) {
     try {
-      const double value = controller::parse_quantity(text, unit);
+      const double value = text::parse_quantity(text, unit);
       if (value >= least && value <= most) return std::optional(value);
     } catch (const std::invalid_argument&) {
     }  // said below, too
@@ -95,9 +94,7 @@ CLI::Validator quantity(const std::string& unit, double least, double most,
   };
   const auto convert = [=](std::string& text) -> std::string {
     if (const auto value = value_of(text)) {
-      std::array<char, 40> number{};
-      std::snprintf(number.data(), number.size(), "%.17g", *value);
-      text = number.data();
+      text = text::number(*value, 17);
       return "";
     }
     std::string meant;

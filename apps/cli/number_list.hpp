@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/yaml/setting_reader.hpp>
+#include <dashpot/text/setting_reader.hpp>
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
@@ -8,16 +8,15 @@
 namespace dashpot::apps {
 
 /// Quantities between commas, "1,-30 deg,0", in SI: one for each of `units`, which is that of a
-/// number without its own (see controller::parse_quantity). Throws controller::InputError with
+/// number without its own (see text::parse_quantity). Throws controller::InputError with
 /// `option` as key.
 Eigen::VectorXd parse_quantities(const std::string& option, const std::string& text,
-                                 const controller::Units& units);
+                                 const text::Units& units);
 
 /// The same, none negative; a single one is that of all joints. Unless `none` is NaN, the word none
 /// stands for it.
 Eigen::VectorXd quantities_per_joint(const std::string& option, const std::string& text,
-                                     const controller::Units& units,
-                                     double none = controller::kNoNone);
+                                     const text::Units& units, double none = text::kNoNone);
 
 /// Checks that an option is a quantity from `least` to `most`, in the SI unit `unit`, and turns it
 /// into a number without unit, as CLI::Option::transform asks for; `what` says what is wanted. A

@@ -1,8 +1,8 @@
 #include <dashpot/apps/cli/posture_files.hpp>
 #include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
-#include <dashpot/controller/yaml/yaml_mapping.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
+#include <dashpot/text/yaml_document.hpp>
+#include <dashpot/text/yaml_mapping.hpp>
 
 #include <array>
 #include <fstream>
@@ -14,22 +14,21 @@ using controller::InputError;
 using controller::JointVector;
 
 std::vector<JointVector> read_postures(const std::string& path, int n) try {
-  const controller::YamlNode document = controller::parse_yaml(controller::read_file(path));
-  if (document.kind != controller::YamlNode::Kind::kSequence || document.items.empty()) {
+  const text::YamlNode document = text::parse_yaml(text::read_input(path));
+  if (document.kind != text::YamlNode::Kind::kSequence || document.items.empty()) {
     throw InputError("", "a list of postures is wanted, each a list of joint positions");
   }
   std::vector<JointVector> postures;
-  for (const controller::YamlNode& item : document.items) {
-    controller::YamlNode holder;  // a mapping, which reads lists of numbers
-    controller::YamlNode key;
-    key.kind = controller::YamlNode::Kind::kScalar;
+  for (const text::YamlNode& item : document.items) {
+    text::YamlNode holder;  // a mapping, which reads lists of numbers
+    text::YamlNode key;
+    key.kind = text::YamlNode::Kind::kScalar;
     key.text = "posture";
-    holder.kind = controller::YamlNode::Kind::kMap;
+    holder.kind = text::YamlNode::Kind::kMap;
     holder.line = item.line;
     holder.items = {key, item};
     static constexpr std::array<std::string_view, 1> kKeys = {"posture"};
-    const controller::YamlMapping mapping(holder, "[" + std::to_string(postures.size()) + "].",
-                                          kKeys);
+    const text::YamlMapping mapping(holder, "[" + std::to_string(postures.size()) + "].", kKeys);
     const Eigen::VectorXd q = *mapping.vector("posture");
     if (q.size() != n) {
       throw mapping.error("posture",

@@ -2,7 +2,7 @@
 #include <dashpot/apps/cli/posture_files.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/posture.hpp>
 
 #include <limits>

@@ -1,8 +1,8 @@
 #include <dashpot/analysis/null_damping.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
-#include <dashpot/controller/yaml/setting_reader.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
-#include <dashpot/controller/yaml/yaml_mapping.hpp>
+#include <dashpot/text/setting_reader.hpp>
+#include <dashpot/text/yaml_document.hpp>
+#include <dashpot/text/yaml_mapping.hpp>
 
 #include <Eigen/Cholesky>
 #include <array>
@@ -15,8 +15,8 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::YamlMapping;
-using controller::YamlNode;
+using text::YamlMapping;
+using text::YamlNode;
 
 constexpr std::array<std::string_view, 20> kKeys = {"mass",
                                                     "damping",
@@ -87,10 +87,10 @@ void read_gears(const YamlMapping& keys, SystemEntry& entry) {
   const auto inertia = per_joint(keys, "reflected_inertia", n);
   if (!inertia) throw keys.error("gear_stiffness", "needs reflected_inertia, of the motors");
   constexpr double kRigid = std::numeric_limits<double>::infinity();
-  controller::read_numbers(keys, "gear_stiffness", units, controller::kPositive, stiffness, kRigid);
-  controller::read_numbers(keys, "gear_damping", units, controller::kNotNegative, damping);
+  text::read_numbers(keys, "gear_stiffness", units, text::kPositive, stiffness, kRigid);
+  text::read_numbers(keys, "gear_damping", units, text::kNotNegative, damping);
   bool link = false;
-  controller::read_choice(
+  text::read_choice(
       keys, "position_sensor",
       std::array<std::pair<std::string_view, bool>, 2>{{{"motor", false}, {"link", true}}}, link);
   try {
@@ -245,7 +245,7 @@ bool has_key(const YamlNode& document, std::string_view key) {
 }
 
 SystemFile read_systems(const std::string& path) {
-  const YamlNode root = controller::parse_yaml(controller::read_file(path));
+  const YamlNode root = text::parse_yaml(text::read_input(path));
   if (root.kind == YamlNode::Kind::kNull) throw InputError("", "is empty");
   if (has_key(root, "robot") || has_key(root, "scenario")) {
     throw InputError("",

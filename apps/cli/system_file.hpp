@@ -2,7 +2,7 @@
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
+#include <dashpot/text/yaml_document.hpp>
 
 #include <Eigen/Core>
 #include <map>
@@ -56,6 +56,6 @@ SystemFile read_systems(const std::string& path);
 extern const char* const kSystemFileHelp;
 
 /// Whether a document is a mapping with this key.
-bool has_key(const controller::YamlNode& document, std::string_view key);
+bool has_key(const text::YamlNode& document, std::string_view key);
 
 }  // namespace dashpot::apps

@@ -38,7 +38,7 @@ struct CommandOptions {
 
 /// Fills an array or vector of the message's.
 template <class Values>
-void take(const std::string& option, const std::string& text, const controller::Units& units,
+void take(const std::string& option, const std::string& text, const text::Units& units,
           Values& values) {
   const Eigen::VectorXd given = parse_quantities(option, text, units);
   for (Eigen::Index i = 0; i < given.size(); ++i) values[static_cast<std::size_t>(i)] = given[i];
@@ -46,18 +46,17 @@ void take(const std::string& option, const std::string& text, const controller::
 
 /// Fills the diagonal of a matrix of the message's.
 template <class Rows>
-void take_diagonal(const std::string& option, const std::string& text,
-                   const controller::Units& units, Rows& rows) {
+void take_diagonal(const std::string& option, const std::string& text, const text::Units& units,
+                   Rows& rows) {
   const Eigen::VectorXd given = quantities_per_joint(option, text, units);
   for (std::size_t i = 0; i < units.size(); ++i) {
     rows[i][i] = given[static_cast<Eigen::Index>(i)];
   }
 }
 
-const controller::Units kTaskStiffnessUnits = {"N/m",     "N/m",     "N/m",
-                                               "N m/rad", "N m/rad", "N m/rad"};
-const controller::Units kTaskDampingUnits = {"N s/m",     "N s/m",     "N s/m",
-                                             "N m s/rad", "N m s/rad", "N m s/rad"};
+const text::Units kTaskStiffnessUnits = {"N/m", "N/m", "N/m", "N m/rad", "N m/rad", "N m/rad"};
+const text::Units kTaskDampingUnits = {"N s/m",     "N s/m",     "N s/m",
+                                       "N m s/rad", "N m s/rad", "N m s/rad"};
 
 /// The gains of the options, in `command`.
 void take_gains(const CommandOptions& options, std::size_t n, command_t& command) {
@@ -80,7 +79,7 @@ void take_gains(const CommandOptions& options, std::size_t n, command_t& command
     command.parts |= command_t::TASK_RATIO;
     command.task_damping_ratio = *options.damping_ratio;
   }
-  const controller::Units stiffness(n, "N m/rad"), damping(n, "N m s/rad");
+  const text::Units stiffness(n, "N m/rad"), damping(n, "N m s/rad");
   if (!options.joint_stiffness.empty() || !options.joint_damping.empty()) {
     if (options.joint_stiffness.empty() ||
         (options.joint_damping.empty() && !options.joint_damping_ratio)) {
@@ -101,8 +100,8 @@ void take_gains(const CommandOptions& options, std::size_t n, command_t& command
   }
   if (!options.null_stiffness.empty()) {
     command.parts |= command_t::NULL_GAINS;
-    const auto fill = [n](const char* option, const std::string& text,
-                          const controller::Units& units, std::vector<double>& values) {
+    const auto fill = [n](const char* option, const std::string& text, const text::Units& units,
+                          std::vector<double>& values) {
       const Eigen::VectorXd given = quantities_per_joint(option, text, units);
       values.assign(given.begin(), given.begin() + static_cast<std::ptrdiff_t>(n));
     };
@@ -132,19 +131,17 @@ command_t make_command(const CommandOptions& options, const state_t& state) {
   }
   if (!options.joint_position.empty()) {
     command.parts |= command_t::JOINT_POSITION;
-    take("--joint-position", options.joint_position, controller::Units(n, "rad"),
-         command.joint_position);
+    take("--joint-position", options.joint_position, text::Units(n, "rad"), command.joint_position);
   }
   if (pose) {
     command.parts |= command_t::TIP_POSE;  // what is not given stays where the springs are fixed
     std::copy_n(state.reference_tip_position, 3, command.tip_position);
     std::copy_n(state.reference_tip_quaternion, 4, command.tip_quaternion);
     if (!options.tip_position.empty()) {
-      take("--tip-position", options.tip_position, controller::Units(3, "m"), command.tip_position);
+      take("--tip-position", options.tip_position, text::Units(3, "m"), command.tip_position);
     }
     if (!options.tip_quaternion.empty()) {
-      take("--tip-quaternion", options.tip_quaternion, controller::Units(4, ""),
-           command.tip_quaternion);
+      take("--tip-quaternion", options.tip_quaternion, text::Units(4, ""), command.tip_quaternion);
     }
   }
   if (!options.wrench.empty()) {
@@ -157,7 +154,7 @@ command_t make_command(const CommandOptions& options, const state_t& state) {
     std::array<double, 4> body{};
     const bool center = options.payload.find(',') != std::string::npos;
     take("--payload", options.payload,
-         center ? controller::Units{"kg", "m", "m", "m"} : controller::Units{"kg"}, body);
+         center ? text::Units{"kg", "m", "m", "m"} : text::Units{"kg"}, body);
     command.payload_mass = body[0];
     std::copy_n(body.begin() + 1, 3, command.payload_center);
   }

@@ -1,5 +1,4 @@
 #include <dashpot/analysis/damping_sampled.hpp>
-#include <dashpot/analysis/design/damping_fit.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
@@ -7,7 +6,6 @@
 #include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/apps/design/design_report.hpp>
 #include <dashpot/apps/report/text_table.hpp>
-#include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/rotors.hpp>
 

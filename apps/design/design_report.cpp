@@ -3,7 +3,7 @@
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/apps/report/text_table.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -12,26 +12,11 @@ namespace dashpot::apps {
 namespace {
 
 using Align = TextTable::Align;
-using Json = nlohmann::ordered_json;
 using identification::MeasuredMode;
 using identification::MotionKind;
 
 std::string count(std::size_t n, const std::string& what) {
   return (n == 0 ? "no" : std::to_string(n)) + " " + what + (n == 1 ? "" : "s");
-}
-
-/// "12.345 +- 0.012": two digits of the deviation, and as many of the value.
-std::string with_deviation(double value, double deviation) {
-  if (!std::isfinite(deviation)) return format_number(value, 3) + " +- ?";
-  const double size = std::max(deviation, 1e-12 * std::abs(value));
-  const int decimals =
-      std::clamp(1 - static_cast<int>(std::floor(std::log10(std::max(size, 1e-300)))), 0, 12);
-  const auto fixed = [decimals](double number) {
-    std::array<char, 400> text{};
-    std::snprintf(text.data(), text.size(), "%.*f", decimals, number);
-    return std::string(text.data());
-  };
-  return fixed(value) + " +- " + fixed(deviation);
 }
 
 /// "q2 - 0.43 q5 + 0.21 q1 (95 deg)", with the channels' names.

@@ -4,7 +4,6 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/posture_loop.hpp>
-#include <dashpot/controller/vibration/closed_loop.hpp>
 
 #include <yaml-cpp/yaml.h>
 #include <algorithm>

@@ -4,7 +4,7 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/text_table.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -50,7 +50,7 @@ RobotModel read_model(const InspectOptions& options) {
   model.include_off_chain = !options.exclude_off_chain;
   take_accepted(options.accept_inertias, model);
   if (!options.gravity.empty()) {
-    model.gravity = parse_quantities("--gravity", options.gravity, controller::Units(3, "m/s^2"));
+    model.gravity = parse_quantities("--gravity", options.gravity, text::Units(3, "m/s^2"));
   }
   take_drives(options.drives, model);
   try {
@@ -83,11 +83,9 @@ const char* to_text(controller::JointType type) {
 }
 
 /// Returns what the file says of the joints; null where it sets no limit.
-nlohmann::ordered_json json_joints(const RobotModel& model) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  const auto limit = [](double value) {
-    return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
-  };
+Json json_joints(const RobotModel& model) {
+  Json list = Json::array();
+  const auto limit = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };
   for (const Joint& joint : model.joints()) {
     list.push_back({{"name", text::printable(joint.name)},
                     {"type", to_text(joint.type)},
@@ -112,16 +110,16 @@ nlohmann::ordered_json json_joints(const RobotModel& model) {
 std::string to_json(const InspectOptions& options, const RobotModel& model,
                     const DynamicsResult& dynamics, const JointVector& q) {
   const bool unknown = controller::unknown_rotors(model).any();
-  nlohmann::ordered_json result = {{"joints", json_joints(model)},
-                                   {"rotors", unknown ? "unknown" : "known"},
-                                   {"q", json_list(q)},
-                                   {"mass_matrix", json_rows(dynamics.M)},
-                                   {"coriolis", json_list(dynamics.coriolis)},
-                                   {"gravity", json_list(dynamics.gravity)},
-                                   {"jacobian", json_rows(dynamics.J)},
-                                   {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
-                                   {"tip_position", json_list(dynamics.p_BT_B)},
-                                   {"tip_rotation", json_rows(dynamics.R_BT)}};
+  Json result = {{"joints", json_joints(model)},
+                 {"rotors", unknown ? "unknown" : "known"},
+                 {"q", json_list(q)},
+                 {"mass_matrix", json_rows(dynamics.M)},
+                 {"coriolis", json_list(dynamics.coriolis)},
+                 {"gravity", json_list(dynamics.gravity)},
+                 {"jacobian", json_rows(dynamics.J)},
+                 {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
+                 {"tip_position", json_list(dynamics.p_BT_B)},
+                 {"tip_rotation", json_rows(dynamics.R_BT)}};
   const controller::Settings settings = controller::default_settings(model);
   if (!settings.limits.torque.isZero(0)) {
     const Stopping stops = controller::stopping(model, settings, q);

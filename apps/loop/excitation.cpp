@@ -1,6 +1,6 @@
 #include <dashpot/apps/loop/excitation.hpp>
 #include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/yaml/quantity.hpp>
+#include <dashpot/text/quantity.hpp>
 
 #include <algorithm>
 #include <array>
@@ -53,7 +53,7 @@ class ExcitationWords {
   double take(const std::string& key, const std::string& unit, double least, double most) {
     double value = 0;
     try {
-      value = controller::parse_quantity(take(key), unit);
+      value = text::parse_quantity(take(key), unit);
     } catch (const std::invalid_argument& error) {
       throw refusal(key + " " + error.what());
     }

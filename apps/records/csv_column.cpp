@@ -1,6 +1,6 @@
 #include <dashpot/apps/records/csv_column.hpp>
 #include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/yaml/quantity.hpp>
+#include <dashpot/text/quantity.hpp>
 
 #include <algorithm>
 #include <array>
@@ -43,7 +43,7 @@ std::optional<Conversion> to_si_as_written(std::string unit) {
   if (unit == "ns") return Conversion{"s", 1e-9};
   for (const char* si : {"s", "rad", "m", "rad/s", "m/s", "N m", "N"}) {
     try {
-      return Conversion{si, controller::parse_quantity("1 " + unit, si)};
+      return Conversion{si, text::parse_quantity("1 " + unit, si)};
     } catch (const std::invalid_argument&) {
       continue;
     }

@@ -1,6 +1,6 @@
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/run/csv_sink.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/contact_t.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
@@ -19,7 +19,7 @@ constexpr std::array kJointColumns = {"q", "qd", "torque"};
 
 class CsvSink : public lcmtypes::Sink {
  public:
-  CsvSink(const std::string& path, std::array<controller::Units, 3> units)
+  CsvSink(const std::string& path, std::array<text::Units, 3> units)
       : file_("--csv", path), units_(std::move(units)) {}
 
   bool send(const std::string& channel, const std::vector<std::uint8_t>& bytes,
@@ -92,7 +92,7 @@ class CsvSink : public lcmtypes::Sink {
   }
 
   OutputFile file_;
-  std::array<controller::Units, 3> units_;
+  std::array<text::Units, 3> units_;
   std::optional<contact_t> contact_;  // of the next state
   std::string line_;
   bool any_ = false;
@@ -104,7 +104,7 @@ class CsvSink : public lcmtypes::Sink {
 
 std::unique_ptr<lcmtypes::Sink> make_csv_sink(const std::string& path,
                                               const controller::RobotModel* model) {
-  std::array<controller::Units, 3> units;
+  std::array<text::Units, 3> units;
   if (model != nullptr) {
     units = {controller::joint_units(*model, "rad", "m"),
              controller::joint_units(*model, "rad/s", "m/s"),

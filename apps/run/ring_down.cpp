@@ -3,7 +3,6 @@
 #include <dashpot/apps/report/mode_pairs.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
 #include <dashpot/controller/posture_loop.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/identification/identification.hpp>
 
 #include <algorithm>

@@ -1,12 +1,10 @@
 #pragma once
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/motion/reference.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/settings.hpp>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 namespace dashpot::apps {
 
@@ -20,9 +18,8 @@ struct TipGoal {
   /// base axes.
   controller::Vector6 miss(const controller::DynamicsResult& tip) const {
     controller::Vector6 error;
-    error << pose.position - tip.p_BT_B,
-        controller::short_turn(
-            Eigen::Quaterniond(Eigen::Matrix3d(pose.rotation * tip.R_BT.transpose())));
+    const Eigen::AngleAxisd turn(Eigen::Matrix3d(pose.rotation * tip.R_BT.transpose()));
+    error << pose.position - tip.p_BT_B, turn.angle() * turn.axis();
     return controller::part_along(selected, R, error);
   }
 };
@@ -72,21 +69,13 @@ inline controller::Vector6 descend(const controller::RobotModel& model,
 /// and from postures all over its range: zero, to 1e-6 m and rad, if it gets there.
 inline controller::Vector6 out_of_reach_by(const controller::RobotModel& model,
                                            const controller::Limits& limits, const TipGoal& goal,
-                                           controller::JointVector q) {
+                                           const controller::JointVector& q) {
   constexpr int kPostures = 32;
   constexpr double kThere = 1e-6;
-  constexpr double kGoldenRatio = 0.6180339887498949;
   controller::Vector6 least = descend(model, limits, goal, q);
-  double share = 0;
+  const controller::PostureSequence postures(limits.position_lower, limits.position_upper);
   for (int k = 0; k < kPostures && least.norm() > kThere; ++k) {
-    for (Eigen::Index i = 0; i < q.size(); ++i) {
-      share += kGoldenRatio;
-      share -= std::floor(share);
-      const double lower = std::max(limits.position_lower[i], -std::numbers::pi);
-      const double upper = std::min(limits.position_upper[i], std::numbers::pi);
-      q[i] = lower + share * (upper - lower);
-    }
-    const controller::Vector6 miss = descend(model, limits, goal, q);
+    const controller::Vector6 miss = descend(model, limits, goal, postures.at(k));
     if (miss.norm() < least.norm()) least = miss;
   }
   return least.norm() > kThere ? least : controller::Vector6(controller::Vector6::Zero());

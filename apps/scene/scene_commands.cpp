@@ -5,9 +5,9 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::kNotNegative;
-using controller::kPositive;
-using controller::YamlMapping;
+using text::kNotNegative;
+using text::kPositive;
+using text::YamlMapping;
 
 /// Reads a time into `microseconds`.
 void read_microseconds(const YamlMapping& keys, const char* key, std::int64_t& microseconds) {
@@ -20,7 +20,7 @@ void read_microseconds(const YamlMapping& keys, const char* key, std::int64_t& m
 
 /// Reads a limit that may be lowered only.
 void read_at_most(const YamlMapping& keys, const char* key, const char* unit, double& limit) {
-  const controller::Range range{0, false, limit};
+  const text::Range range{0, false, limit};
   read_number(keys, key, unit, range, limit);
 }
 

@@ -5,11 +5,11 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::kAnyNumber;
-using controller::kNotNegative;
-using controller::kPositive;
-using controller::Units;
-using controller::YamlMapping;
+using text::kAnyNumber;
+using text::kNotNegative;
+using text::kPositive;
+using text::Units;
+using text::YamlMapping;
 
 /// Reads what the sensors show wrongly. Returns whether anything.
 bool read_sensor_fault(const YamlMapping& keys, const Units& positions, sim::SensorFault& fault) {

@@ -2,7 +2,7 @@
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/scene/scene_parts.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 
 #include <algorithm>
 #include <filesystem>
@@ -11,10 +11,10 @@ namespace dashpot::apps {
 namespace {
 
 using controller::Joint;
-using controller::kPositive;
-using controller::Units;
-using controller::YamlMapping;
-using controller::YamlNode;
+using text::kPositive;
+using text::Units;
+using text::YamlMapping;
+using text::YamlNode;
 
 /// Returns what the controller believes of the robot, which is true unless `simulation.robot` says
 /// otherwise.
@@ -127,7 +127,7 @@ void check(const Scene& scene) try {
 Scene load_scene(const std::string& path) try {
   Scene scene;
   scene.path = path;
-  const YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
+  const YamlNode document = text::parse_yaml(text::read_regular_file(path));
   if (has_key(document, "mass")) {
     throw InputError("",
                      "is a system of matrices, which dashpot analyze and design take; a scene has "
@@ -145,7 +145,7 @@ Scene load_scene(const std::string& path) try {
 }
 
 CommandedConfig load_commanded_config(const std::string& path) try {
-  const YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
+  const YamlNode document = text::parse_yaml(text::read_regular_file(path));
   controller::Config config =
       controller::read_config(document, std::filesystem::path(path).parent_path());
   const lcmtypes::CommandLimits limits =

@@ -2,7 +2,7 @@
 // The parts of a scene file, each under its key.
 
 #include <dashpot/apps/scene/scene.hpp>
-#include <dashpot/controller/yaml/setting_reader.hpp>
+#include <dashpot/text/setting_reader.hpp>
 
 namespace dashpot::apps {
 
@@ -14,40 +14,36 @@ struct ArmSimulation {
 
 /// Reads `simulation` of a scene of n joints into `plant`, and for an arm into `arm`; units are
 /// those of `positions` ("rad" or "m" each). Throws InputError.
-void read_simulation(const controller::YamlMapping& root, const controller::Units& positions,
+void read_simulation(const text::YamlMapping& root, const text::Units& positions,
                      sim::PlantOptions& plant, ArmSimulation* arm);
 
 /// Reads mass, center and inertia of a body at the tip. Throws InputError.
 template <class Vector3, class Matrix3>
-void read_body(const controller::YamlMapping& keys, double& mass, Vector3& center,
-               Matrix3& inertia) {
-  read_number(keys, "mass", "kg", controller::kNotNegative, mass);
+void read_body(const text::YamlMapping& keys, double& mass, Vector3& center, Matrix3& inertia) {
+  read_number(keys, "mass", "kg", text::kNotNegative, mass);
   read_vector3(keys, "center", "m", center);
-  read_matrix(keys, "inertia", controller::Units(3, "kg m^2"), inertia);
+  read_matrix(keys, "inertia", text::Units(3, "kg m^2"), inertia);
 }
 
 /// Reads `commands`, of an arm. Throws InputError.
-void read_commands(const controller::YamlMapping& root, lcmtypes::CommandLimits& limits);
+void read_commands(const text::YamlMapping& root, lcmtypes::CommandLimits& limits);
 
 /// Reads `scenario` into the scene, whose arm or matrices are there already. Throws InputError.
-void read_scenario(const controller::YamlMapping& root, const controller::Units& positions,
-                   Scene& scene);
+void read_scenario(const text::YamlMapping& root, const text::Units& positions, Scene& scene);
 
 /// Reads `scenario.faults` into the plant's options and the scene. Throws InputError.
-void read_faults(const controller::YamlMapping& scenario, const controller::Units& positions,
-                 Scene& scene);
+void read_faults(const text::YamlMapping& scenario, const text::Units& positions, Scene& scene);
 
 /// The entries of a list of mappings under `scenario`, each with the prefix of its keys in
 /// messages.
-std::vector<controller::YamlMapping> mappings(const controller::YamlMapping& keys,
-                                              std::string_view key,
-                                              std::span<const std::string_view> known_keys);
+std::vector<text::YamlMapping> mappings(const text::YamlMapping& keys, std::string_view key,
+                                        std::span<const std::string_view> known_keys);
 /// Reads `begin` and `end` of what happens in a scenario; an end that is missing stays as it is.
 /// Throws InputError for an end that is not after the begin, and a begin after the scenario.
-void read_when(const controller::YamlMapping& keys, const Scene& scene, double& begin, double& end);
+void read_when(const text::YamlMapping& keys, const Scene& scene, double& begin, double& end);
 /// Throws unless `keys` has `key`; `parent` has `keys` under `name`.
-void require(const controller::YamlMapping& keys, std::string_view key,
-             const controller::YamlMapping& parent, std::string_view name);
+void require(const text::YamlMapping& keys, std::string_view key, const text::YamlMapping& parent,
+             std::string_view name);
 
 /// The joint position next to `q` where the tip is displaced from its pose at `q` by `displacement`
 /// (m, and a rotation vector in rad; base axes): the one that is reached with the least kinetic

@@ -1,9 +1,7 @@
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/scene/arm_reach.hpp>
 #include <dashpot/apps/scene/scene_parts.hpp>
-#include <dashpot/controller/base/orientation.hpp>
-#include <dashpot/controller/config/config_gains.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/posture.hpp>
 
@@ -15,15 +13,15 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::kAnyNumber;
-using controller::kNotNegative;
-using controller::kPositive;
 using controller::Pose;
 using controller::RobotModel;
-using controller::Units;
 using controller::Vector6;
-using controller::YamlMapping;
-using controller::YamlNode;
+using text::kAnyNumber;
+using text::kNotNegative;
+using text::kPositive;
+using text::Units;
+using text::YamlMapping;
+using text::YamlNode;
 
 constexpr double kLongest = 1e7;  // s
 const Units kTaskUnits = {"m", "m", "m", "rad", "rad", "rad"};
@@ -35,9 +33,9 @@ Pose tip_at(const RobotModel& model, const JointVector& q) {
 }
 
 Pose moved(const Pose& pose, const Vector6& displacement) {
+  const Eigen::Vector3d turn = displacement.tail<3>();
   return {pose.position + displacement.head<3>(),
-          controller::quaternion(Eigen::Vector3d(displacement.tail<3>())).toRotationMatrix() *
-              pose.rotation};
+          Eigen::AngleAxisd(turn.norm(), turn.normalized()) * pose.rotation};
 }
 
 /// Throws unless the joints may be at q, which stands under `key`.
@@ -257,7 +255,7 @@ std::vector<YamlMapping> mappings(const YamlMapping& keys, std::string_view key,
   std::vector<YamlMapping> result;
   if (node == nullptr) return result;
   if (node->kind != YamlNode::Kind::kSequence) {
-    throw keys.error(key, "a list is wanted, not " + controller::describe(*node));
+    throw keys.error(key, "a list is wanted, not " + text::describe(*node));
   }
   for (std::size_t i = 0; i < node->items.size(); ++i) {
     result.emplace_back(node->items[i],
@@ -286,9 +284,8 @@ std::optional<JointVector> displaced(const RobotModel& model, const JointVector&
   for (int i = 0; i < 50; ++i) {
     const auto there = controller::evaluate(model, at, JointVector::Zero(q.size()));
     Vector6 error;
-    error << goal.position - there.p_BT_B,
-        controller::rotation_vector(
-            Eigen::Quaterniond(Eigen::Matrix3d(goal.rotation * there.R_BT.transpose())));
+    const Eigen::AngleAxisd turn(Eigen::Matrix3d(goal.rotation * there.R_BT.transpose()));
+    error << goal.position - there.p_BT_B, turn.angle() * turn.axis();
     if (!error.allFinite()) return {};
     if (error.norm() < 1e-12) return at;
     // With M = L L': dq = L^-T (J L^-T)^+ error.

@@ -7,11 +7,11 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::kNotNegative;
-using controller::kPositive;
-using controller::Range;
-using controller::Units;
-using controller::YamlMapping;
+using text::kNotNegative;
+using text::kPositive;
+using text::Range;
+using text::Units;
+using text::YamlMapping;
 
 constexpr double kMostSteps = 1000;  // of the integrator in a control period
 constexpr double kRigid = std::numeric_limits<double>::infinity();
@@ -27,7 +27,7 @@ Units joint_units(const Units& positions, const char* revolute, const char* pris
 
 /// Sets `value` to n numbers if the key is there; otherwise it stays empty, which is off.
 void read_joint_option(const YamlMapping& keys, std::string_view key, const Units& units,
-                       const Range& range, JointVector& value, double none = controller::kNoNone) {
+                       const Range& range, JointVector& value, double none = text::kNoNone) {
   if (!keys.has(key)) return;
   value.resize(static_cast<Eigen::Index>(units.size()));
   read_numbers(keys, key, units, range, value, none);

@@ -3,7 +3,7 @@
 #include <dashpot/analysis/null_damping.hpp>
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/audit/stated_gains.hpp>
-#include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/loop_system.hpp>

@@ -1,6 +1,6 @@
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/controller/model/least_inertia.hpp>
-#include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/rotors.hpp>
 
 #include <algorithm>

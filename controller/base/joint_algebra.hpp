@@ -28,4 +28,13 @@ double product(const JointVector& a, const JointVector& b) noexcept;
 /// Returns true if all entries are finite.
 bool finite(const JointVector& x) noexcept;
 
+/// K += J1' A J2
+inline void add_congruence(const Jacobian& J1, const Matrix6& A, const Jacobian& J2,
+                           JointMatrix& K) noexcept {
+  for (Eigen::Index j = 0; j < K.cols(); ++j) {
+    const Vector6 column_j = A * J2.col(j);
+    for (Eigen::Index i = 0; i < K.rows(); ++i) K(i, j) += J1.col(i).dot(column_j);
+  }
+}
+
 }  // namespace dashpot::controller

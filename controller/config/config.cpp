@@ -1,10 +1,8 @@
 #include <dashpot/controller/base/settings_table.hpp>
 #include <dashpot/controller/config.hpp>
-#include <dashpot/controller/config/config_gains.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/settings_check.hpp>
-#include <dashpot/controller/yaml/setting_reader.hpp>
+#include <dashpot/text/setting_reader.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -38,14 +36,15 @@ std::vector<std::string_view> keys_of(std::string_view section) {
 /// Reads settings from their sections of a document.
 class SettingsReader {
  public:
-  SettingsReader(const YamlMapping& root, const RobotModel& model) : root_(root), model_(model) {}
+  SettingsReader(const text::YamlMapping& root, const RobotModel& model)
+      : root_(root), model_(model) {}
 
   /// The mapping of a section, empty if it is not there.
-  const YamlMapping& section(const std::string& name) {
+  const text::YamlMapping& section(const std::string& name) {
     const auto found = sections_.find(name);
     if (found != sections_.end()) return found->second;
     const auto [parent, last] = split(name);
-    const YamlMapping& above = name.find('.') == std::string::npos ? root_ : section(parent);
+    const text::YamlMapping& above = name.find('.') == std::string::npos ? root_ : section(parent);
     return sections_.emplace(name, above.mapping(last, keys_of(name))).first->second;
   }
 
@@ -56,25 +55,25 @@ class SettingsReader {
   }
 
  private:
-  static void read(const YamlMapping& keys, std::string_view key, const Setting& setting,
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& setting,
                    double& value) {
     read_number(keys, key, setting.unit, setting.range, value, setting.none);
   }
-  static void read(const YamlMapping& keys, std::string_view key, const Setting& setting,
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& setting,
                    int& value) {
     read_count(keys, key, static_cast<int>(setting.range.least), value);
   }
-  static void read(const YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
                    bool& value) {
     read_switch(keys, key, value);
   }
-  static void read(const YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
                    Mode& value) {
     static constexpr std::array<std::pair<std::string_view, Mode>, 2> kModes = {
         {{"joint", Mode::kJoint}, {"cartesian", Mode::kCartesian}}};
     read_choice(keys, key, kModes, value);
   }
-  static void read(const YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
                    Analysis::Where& value) {
     static constexpr std::array<std::pair<std::string_view, Analysis::Where>, 3> kPlaces = {
         {{"off", Analysis::Where::kOff},
@@ -82,14 +81,14 @@ class SettingsReader {
          {"background", Analysis::Where::kBackground}}};
     read_choice(keys, key, kPlaces, value);
   }
-  static void read(const YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
                    FeedForward::FrictionAt& value) {
     static constexpr std::array<std::pair<std::string_view, FeedForward::FrictionAt>, 2> kAt = {
         {{"reference", FeedForward::FrictionAt::kReference},
          {"measured", FeedForward::FrictionAt::kMeasured}}};
     read_choice(keys, key, kAt, value);
   }
-  static void read(const YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
                    Load& value) {
     static constexpr std::array<std::pair<std::string_view, Load>, 4> kLoads = {
         {{"ignored", Load::kIgnored},
@@ -98,35 +97,35 @@ class SettingsReader {
          {"joint_torques", Load::kJointTorques}}};
     read_choice(keys, key, kLoads, value);
   }
-  static void read(const YamlMapping& keys, std::string_view key, const Setting& setting,
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& setting,
                    Vector6& value) {
     const std::string& linear = setting.unit;
     const std::string& angular = setting.prismatic;
     read_numbers(keys, key, {linear, linear, linear, angular, angular, angular}, setting.range,
                  value, setting.none);
   }
-  void read(const YamlMapping& keys, std::string_view key, const Setting& setting,
+  void read(const text::YamlMapping& keys, std::string_view key, const Setting& setting,
             JointVector& value) const {
-    const Units units = joint_units(model_, setting.unit, setting.prismatic);
+    const text::Units units = joint_units(model_, setting.unit, setting.prismatic);
     read_numbers(keys, key, units, setting.range, value, setting.none);
   }
 
-  const YamlMapping& root_;
+  const text::YamlMapping& root_;
   const RobotModel& model_;
-  std::map<std::string, YamlMapping> sections_;
+  std::map<std::string, text::YamlMapping> sections_;
 };
 
 /// The line of the value under a key such as "limits.torque"; if it is not there, of what is
 /// nearest above it, unless it has to be `exactly` there; 0 if nothing is.
-int line_of(const YamlNode& root, const std::string& key, bool exactly = false) {
-  const YamlNode* node = &root;
+int line_of(const text::YamlNode& root, const std::string& key, bool exactly = false) {
+  const text::YamlNode* node = &root;
   int line = 0;
   for (std::size_t begin = 0; begin < key.size();) {
     const std::size_t end = std::min(key.find('.', begin), key.size());
     const auto item = std::find_if(
         node->items.begin(), node->items.end(),
-        [&](const YamlNode& one) { return one.text == key.substr(begin, end - begin); });
-    if (node->kind != YamlNode::Kind::kMap || item == node->items.end()) {
+        [&](const text::YamlNode& one) { return one.text == key.substr(begin, end - begin); });
+    if (node->kind != text::YamlNode::Kind::kMap || item == node->items.end()) {
       return exactly ? 0 : line;
     }
     node = &*std::next(item);
@@ -137,7 +136,7 @@ int line_of(const YamlNode& root, const std::string& key, bool exactly = false) 
 }
 
 /// Refuses keys that limits.stopping_time replaces.
-void refuse_replaced(const YamlNode& document) {
+void refuse_replaced(const text::YamlNode& document) {
   for (const char* key : {"damping", "position_margin", "repulsion", "return_velocity"}) {
     const std::string name = std::string("limits.") + key;
     const int line = line_of(document, name, true);
@@ -146,15 +145,15 @@ void refuse_replaced(const YamlNode& document) {
 }
 
 /// The period, and the defaults that depend on it.
-void read_period(const YamlMapping& control, Settings& settings) {
+void read_period(const text::YamlMapping& control, Settings& settings) {
   constexpr double kGap = 2.5;  // periods
   if (control.has("period") && control.has("rate")) {
     throw control.error("rate", "stands beside period, which says the same");
   }
-  read_number(control, "period", "s", kPositive, settings.period);
+  read_number(control, "period", "s", text::kPositive, settings.period);
   if (control.has("rate")) {
     double rate = 0;
-    read_number(control, "rate", "Hz", kPositive, rate);
+    read_number(control, "rate", "Hz", text::kPositive, rate);
     settings.period = 1 / rate;
   }
   Motion& motion = settings.motion;
@@ -163,16 +162,17 @@ void read_period(const YamlMapping& control, Settings& settings) {
   watchdog.longest_gap = std::max(watchdog.longest_gap, kGap * settings.period);  // of slow loops
 }
 
-void read_walls(const YamlMapping& limits, std::vector<Wall>& walls) {
+void read_walls(const text::YamlMapping& limits, std::vector<Wall>& walls) {
   static constexpr std::array<std::string_view, 2> kKeys = {"point", "normal"};
-  const YamlNode* list = limits.find("walls");
+  const text::YamlNode* list = limits.find("walls");
   if (list == nullptr) return;
-  if (list->kind != YamlNode::Kind::kSequence) {
+  if (list->kind != text::YamlNode::Kind::kSequence) {
     throw limits.error("walls", "a list is wanted, not " + describe(*list));
   }
   walls.clear();
   for (std::size_t i = 0; i < list->items.size(); ++i) {
-    const YamlMapping keys(list->items[i], "limits.walls[" + std::to_string(i + 1) + "].", kKeys);
+    const text::YamlMapping keys(list->items[i], "limits.walls[" + std::to_string(i + 1) + "].",
+                                 kKeys);
     Wall& wall = walls.emplace_back();
     for (const std::string_view key : kKeys) {
       if (!keys.has(key)) throw keys.error(key, "missing", limits.line("walls"));
@@ -199,7 +199,7 @@ std::string key_of_setting(std::string setting) {
 }
 
 /// Throws an InputError about the first setting that the controller would refuse, in either mode.
-void check(const Settings& settings, const RobotModel& model, const YamlNode& document) {
+void check(const Settings& settings, const RobotModel& model, const text::YamlNode& document) {
   Settings other = settings;
   other.initial.mode = settings.initial.mode == Mode::kJoint ? Mode::kCartesian : Mode::kJoint;
   try {
@@ -215,7 +215,7 @@ void check(const Settings& settings, const RobotModel& model, const YamlNode& do
 
 /// Names gains that do nothing in the mode in which the controller begins, and may be all that was
 /// meant.
-std::vector<std::string> unused(const YamlNode& document, Mode mode) {
+std::vector<std::string> unused(const text::YamlNode& document, Mode mode) {
   const bool joint = mode == Mode::kJoint;
   const std::string used = joint ? "gains.joint" : "gains.task";
   const std::string other = joint ? "gains.task" : "gains.joint";
@@ -228,9 +228,9 @@ std::vector<std::string> unused(const YamlNode& document, Mode mode) {
 
 }  // namespace
 
-Config read_config(const YamlNode& document, const std::filesystem::path& directory) {
+Config read_config(const text::YamlNode& document, const std::filesystem::path& directory) {
   refuse_replaced(document);
-  const YamlMapping root(document, "", kConfigSections);
+  const text::YamlMapping root(document, "", kConfigSections);
   const RobotDescription robot = read_robot(root, directory);
   const RobotModel model = robot.model();
   Settings settings = default_settings(model);
@@ -244,7 +244,7 @@ Config read_config(const YamlNode& document, const std::filesystem::path& direct
 }
 
 Config load_config(const std::string& path) try {
-  return read_config(parse_yaml(read_regular_file(path)),
+  return read_config(text::parse_yaml(text::read_regular_file(path)),
                      std::filesystem::path(path).parent_path());
 } catch (const InputError& error) {
   throw error.in_file(path);

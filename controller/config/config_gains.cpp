@@ -1,18 +1,17 @@
-#include <dashpot/controller/config/config_gains.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 
 #include <utility>
 
 namespace dashpot::controller {
 namespace {
 
-Units task_units(const char* linear, const char* angular) {
+text::Units task_units(const char* linear, const char* angular) {
   return {linear, linear, linear, angular, angular, angular};
 }
 
 /// Damping that suits a default stiffness suits no other, so the two come together; a damping ratio
 /// suits any.
-void require_pair(const YamlMapping& keys) {
+void require_pair(const text::YamlMapping& keys) {
   for (const auto& [key, other] : {std::pair("stiffness", "damping"), {"damping", "stiffness"}}) {
     if (keys.has(key) && !keys.has(other) && !keys.has("damping_ratio")) {
       throw keys.error(other, std::string("missing; it goes with ") + key, keys.line(key));
@@ -21,7 +20,7 @@ void require_pair(const YamlMapping& keys) {
 }
 
 /// Reads `damping_ratio`: it and `damping`, which was read before, end each other.
-void read_ratio(const YamlMapping& keys, double& ratio) {
+void read_ratio(const text::YamlMapping& keys, double& ratio) {
   if (keys.has("damping")) ratio = 0;
   if (!keys.has("damping_ratio")) return;
   if (keys.has("damping")) {
@@ -30,11 +29,11 @@ void read_ratio(const YamlMapping& keys, double& ratio) {
   read_number(keys, "damping_ratio", "", {0, false, kLargestDampingRatio}, ratio);
 }
 
-void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
+void read_directions(const text::YamlMapping& task, std::array<bool, 6>& directions) {
   static constexpr std::array<std::string_view, 6> kWords = {"x", "y", "z", "rx", "ry", "rz"};
-  const YamlNode* node = task.find("directions");
+  const text::YamlNode* node = task.find("directions");
   if (node == nullptr) return;
-  if (node->kind != YamlNode::Kind::kSequence) {
+  if (node->kind != text::YamlNode::Kind::kSequence) {
     throw task.error("directions", "a list is wanted, not " + describe(*node));
   }
   directions = {};
@@ -48,26 +47,27 @@ void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
 
 }  // namespace
 
-void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pairs, Gains& gains) {
+void read_gains(const text::YamlMapping& parent, const RobotModel& model, GainPairs pairs,
+                Gains& gains) {
   static constexpr std::array<std::string_view, 3> kKeys = {"joint", "task", "null_space"};
   static constexpr std::array<std::string_view, 3> kJointKeys = {"stiffness", "damping",
                                                                  "damping_ratio"};
   static constexpr std::array<std::string_view, 5> kTaskKeys = {
       "stiffness", "damping", "damping_ratio", "frame", "directions"};
-  const YamlMapping keys = parent.mapping("gains", kKeys);
-  const auto require = [pairs](const YamlMapping& part) {
+  const text::YamlMapping keys = parent.mapping("gains", kKeys);
+  const auto require = [pairs](const text::YamlMapping& part) {
     if (pairs == GainPairs::kTogether) require_pair(part);
   };
-  const Units stiffness = joint_units(model, "N m/rad", "N/m");
-  const Units damping = joint_units(model, "N m s/rad", "N s/m");
+  const text::Units stiffness = joint_units(model, "N m/rad", "N/m");
+  const text::Units damping = joint_units(model, "N m s/rad", "N s/m");
 
-  const YamlMapping joint = keys.mapping("joint", kJointKeys);
+  const text::YamlMapping joint = keys.mapping("joint", kJointKeys);
   require(joint);
   read_matrix(joint, "stiffness", stiffness, gains.joint_stiffness);
   read_matrix(joint, "damping", damping, gains.joint_damping);
   read_ratio(joint, gains.joint_damping_ratio);
 
-  const YamlMapping task = keys.mapping("task", kTaskKeys);
+  const text::YamlMapping task = keys.mapping("task", kTaskKeys);
   require(task);
   read_matrix(task, "stiffness", task_units("N/m", "N m/rad"), gains.task_stiffness);
   read_matrix(task, "damping", task_units("N s/m", "N m s/rad"), gains.task_damping);
@@ -77,14 +77,14 @@ void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pa
   read_choice(task, "frame", kFrames, gains.frame);
   read_directions(task, gains.directions);
 
-  const YamlMapping null_space = keys.mapping("null_space", kJointKeys);
+  const text::YamlMapping null_space = keys.mapping("null_space", kJointKeys);
   require(null_space);
-  read_numbers(null_space, "stiffness", stiffness, kNotNegative, gains.null_stiffness);
-  read_numbers(null_space, "damping", damping, kNotNegative, gains.null_damping);
+  read_numbers(null_space, "stiffness", stiffness, text::kNotNegative, gains.null_stiffness);
+  read_numbers(null_space, "damping", damping, text::kNotNegative, gains.null_damping);
   read_ratio(null_space, gains.null_damping_ratio);
 }
 
-Gains read_gains(const YamlMapping& parent, const RobotModel& model) {
+Gains read_gains(const text::YamlMapping& parent, const RobotModel& model) {
   const int n = model.dof();
   Gains gains;
   gains.joint_stiffness = gains.joint_damping = JointMatrix::Zero(n, n);

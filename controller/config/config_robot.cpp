@@ -1,4 +1,4 @@
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/drives.hpp>
 
 #include <Eigen/Geometry>
@@ -8,22 +8,22 @@
 namespace dashpot::controller {
 namespace {
 
-void read_payload(const YamlMapping& robot, Payload& payload) {
+void read_payload(const text::YamlMapping& robot, Payload& payload) {
   static constexpr std::array<std::string_view, 3> kKeys = {"mass", "center", "inertia"};
-  const YamlMapping keys = robot.mapping("payload", kKeys);
-  read_number(keys, "mass", "kg", kNotNegative, payload.mass);
+  const text::YamlMapping keys = robot.mapping("payload", kKeys);
+  read_number(keys, "mass", "kg", text::kNotNegative, payload.mass);
   read_vector3(keys, "center", "m", payload.center);
-  read_matrix(keys, "inertia", Units(3, "kg m^2"), payload.inertia);
+  read_matrix(keys, "inertia", text::Units(3, "kg m^2"), payload.inertia);
   if (payload.mass == 0 && !(payload.center.isZero(0) && payload.inertia.isZero(0))) {
     throw robot.error("payload", "has a centre or inertia, and no mass");
   }
 }
 
-void read_tool(const YamlMapping& robot, Pose& tool) {
+void read_tool(const text::YamlMapping& robot, Pose& tool) {
   using Eigen::AngleAxisd;
   using Eigen::Vector3d;
   static constexpr std::array<std::string_view, 2> kKeys = {"position", "rpy"};
-  const YamlMapping keys = robot.mapping("tool", kKeys);
+  const text::YamlMapping keys = robot.mapping("tool", kKeys);
   Vector3d rpy = Vector3d::Zero();
   read_vector3(keys, "position", "m", tool.position);
   read_vector3(keys, "rpy", "rad", rpy);
@@ -36,44 +36,46 @@ void read_tool(const YamlMapping& robot, Pose& tool) {
 }
 
 /// true, false, or a list of links.
-void read_accepted(const YamlMapping& robot, ModelOptions& options) {
-  const YamlNode* node = robot.find("accept_inertias");
-  if (node == nullptr || node->kind != YamlNode::Kind::kSequence) {
+void read_accepted(const text::YamlMapping& robot, ModelOptions& options) {
+  const text::YamlNode* node = robot.find("accept_inertias");
+  if (node == nullptr || node->kind != text::YamlNode::Kind::kSequence) {
     read_switch(robot, "accept_inertias", options.accept_inertias);
     return;
   }
-  for (const YamlNode& item : node->items) {
-    if (item.kind != YamlNode::Kind::kScalar) {
+  for (const text::YamlNode& item : node->items) {
+    if (item.kind != text::YamlNode::Kind::kScalar) {
       throw robot.error("accept_inertias", "true, false or names of links are wanted");
     }
     options.accept_inertias_of.push_back(item.text);
   }
 }
 
-std::string required_text(const YamlMapping& root, const YamlMapping& robot, std::string_view key) {
+std::string required_text(const text::YamlMapping& root, const text::YamlMapping& robot,
+                          std::string_view key) {
   if (!robot.has(key)) throw robot.error(key, "missing", root.line("robot"));
   std::string text;
   read_text(robot, key, text);
   return text;
 }
 
-void read_joint_option(const YamlMapping& robot, std::string_view key, const Units& units,
-                       JointVector& option, const Range& range = kNotNegative,
-                       double none = kNoNone) {
+void read_joint_option(const text::YamlMapping& robot, std::string_view key,
+                       const text::Units& units, JointVector& option,
+                       const text::Range& range = text::kNotNegative, double none = text::kNoNone) {
   if (!robot.has(key)) return;
   option.resize(static_cast<Eigen::Index>(units.size()));
   read_numbers(robot, key, units, range, option, none);
 }
 
 /// What is told of gears that bend, and of torque controllers inside the drives.
-void read_gears(const YamlMapping& keys, const RobotModel& model, ModelOptions& options) {
+void read_gears(const text::YamlMapping& keys, const RobotModel& model, ModelOptions& options) {
   read_joint_option(keys, "torque_loop_inertia_ratio", joint_units(model, "", ""),
-                    options.torque_loop_inertia_ratio, Range{0, false, 1});
+                    options.torque_loop_inertia_ratio, text::Range{0, false, 1});
   if (options.torque_loop_inertia_ratio.size() > 0 && options.reflected_inertia.size() == 0) {
     throw keys.error("torque_loop_inertia_ratio", "needs reflected_inertia, kg m^2, or drives");
   }
   read_joint_option(keys, "gear_stiffness", joint_units(model, "N m/rad", "N/m"),
-                    options.gear_stiffness, kPositive, std::numeric_limits<double>::infinity());
+                    options.gear_stiffness, text::kPositive,
+                    std::numeric_limits<double>::infinity());
   read_joint_option(keys, "gear_damping", joint_units(model, "N m s/rad", "N s/m"),
                     options.gear_damping);
   if (keys.has("gear_damping") && options.gear_stiffness.size() == 0) {
@@ -86,7 +88,7 @@ void read_gears(const YamlMapping& keys, const RobotModel& model, ModelOptions& 
 }
 
 /// Takes the drives that the keys name into `robot`, and returns its model.
-RobotModel read_drives(const YamlMapping& keys, RobotDescription& robot) {
+RobotModel read_drives(const text::YamlMapping& keys, RobotDescription& robot) {
   read_switch(keys, "drives_friction", robot.options.drives_friction);
   if (robot.options.drives_friction && !keys.has("drives")) {
     throw keys.error("drives_friction", "needs drives");
@@ -105,17 +107,18 @@ RobotModel read_drives(const YamlMapping& keys, RobotDescription& robot) {
 
 }  // namespace
 
-Units joint_units(const RobotModel& model, const char* revolute, const char* prismatic) {
-  Units units;
+text::Units joint_units(const RobotModel& model, const char* revolute, const char* prismatic) {
+  text::Units units;
   for (const Joint& joint : model.joints()) {
     units.emplace_back(joint.type == JointType::kPrismatic ? prismatic : revolute);
   }
   return units;
 }
 
-void read_joint_options(const YamlMapping& keys, const RobotModel& model, ModelOptions& options) {
+void read_joint_options(const text::YamlMapping& keys, const RobotModel& model,
+                        ModelOptions& options) {
   read_payload(keys, options.payload);
-  const Units damping = joint_units(model, "N m s/rad", "N s/m");
+  const text::Units damping = joint_units(model, "N m s/rad", "N s/m");
   read_joint_option(keys, "reflected_inertia", joint_units(model, "kg m^2", "kg"),
                     options.reflected_inertia);
   read_joint_option(keys, "viscous_friction", damping, options.viscous_friction);
@@ -124,7 +127,7 @@ void read_joint_options(const YamlMapping& keys, const RobotModel& model, ModelO
   read_gears(keys, model, options);
 }
 
-RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory,
+RobotDescription read_robot(const text::YamlMapping& root, const std::filesystem::path& directory,
                             const std::string& text) try {
   static constexpr std::array<std::string_view, 17> kKeys = {"urdf",
                                                              "base",
@@ -143,7 +146,7 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
                                                              "position_sensor",
                                                              "payload",
                                                              "tool"};
-  const YamlMapping keys = root.mapping("robot", kKeys);
+  const text::YamlMapping keys = root.mapping("robot", kKeys);
   RobotDescription robot;
   robot.urdf = directory / required_text(root, keys, "urdf");
   robot.base = required_text(root, keys, "base");
@@ -158,7 +161,7 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
 
   // What the joints are is known once there is a model; some inertia makes any model possible.
   RobotDescription preliminary = robot;
-  const YamlNode* inertia = keys.find("reflected_inertia");
+  const text::YamlNode* inertia = keys.find("reflected_inertia");
   if (inertia != nullptr && inertia->items.size() <= kMaxJoints) {
     preliminary.options.reflected_inertia.setOnes(static_cast<Eigen::Index>(inertia->items.size()));
   }

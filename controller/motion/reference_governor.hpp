@@ -14,16 +14,6 @@ inline Vector6 sprung(const Matrix6& K) noexcept {
   return result;
 }
 
-/// Returns diag(R, R) diag(mask) diag(R, R)' a, the part of the vector a (in B's axes) in the
-/// directions `mask` of the frame with the axes R.
-inline Vector6 part_along(const Vector6& mask, const Eigen::Matrix3d& R,
-                          const Vector6& a) noexcept {
-  Vector6 result;
-  result.head<3>() = R * mask.head<3>().cwiseProduct(R.transpose() * a.head<3>());
-  result.tail<3>() = R * mask.tail<3>().cwiseProduct(R.transpose() * a.tail<3>());
-  return result;
-}
-
 /// Limits the deflection of the tip's springs: e (m, and rad as a rotation vector) becomes
 ///     e - (1 - min(1, r / |e_s|)) e_s,
 /// linear and angular part each by itself. e_s is the part of e in directions that have springs,

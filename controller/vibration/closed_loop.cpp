@@ -1,3 +1,4 @@
+#include <dashpot/controller/base/joint_algebra.hpp>
 #include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/spring_factors.hpp>
@@ -14,15 +15,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kLargestAngle = 2;  // rad
-
-/// K += J1' A J2
-void add_congruence(const Jacobian& J1, const Matrix6& A, const Jacobian& J2,
-                    JointMatrix& K) noexcept {
-  for (Index j = 0; j < K.cols(); ++j) {
-    const Vector6 column_j = A * J2.col(j);
-    for (Index i = 0; i < K.rows(); ++i) K(i, j) += J1.col(i).dot(column_j);
-  }
-}
 
 /// The e with K e = F; zero in directions without springs.
 Vector6 deflection(const Matrix6& K, const Vector6& F) noexcept {
@@ -149,16 +141,6 @@ void add_environment(const Environment& environment, Impedance& impedance) noexc
   impedance.joint_damping.diagonal() += environment.joint_damping;
 }
 
-PassivePart passive_part(const Jacobian& J, const Environment& environment,
-                         const JointMatrix& load_stiffness) noexcept {
-  PassivePart part{load_stiffness, JointMatrix::Zero(J.cols(), J.cols())};
-  add_congruence(J, environment.tip_stiffness.asDiagonal(), J, part.stiffness);
-  add_congruence(J, environment.tip_damping.asDiagonal(), J, part.damping);
-  part.stiffness.diagonal() += environment.joint_stiffness;
-  part.damping.diagonal() += environment.joint_damping;
-  return part;
-}
-
 JointVector friction_left(const RobotModel& model, const Settings& settings) {
   const FeedForward& given = settings.feed_forward;
   JointVector left = model.joint_values(&Joint::viscous_friction);
@@ -168,19 +150,6 @@ JointVector friction_left(const RobotModel& model, const Settings& settings) {
     left[i] -= given.friction_share * (left[i] + coulomb[i] / given.friction_rise);
   }
   return left;
-}
-
-JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
-                               double time) noexcept {
-  if (time == 0) return {};
-  const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
-  JointMatrix K = impedance.joint_stiffness;
-  add_congruence(robot.J, K_C, robot.J, K);
-  const Index n = K.rows();
-  for (Index j = 0; j < n; ++j) {
-    for (Index i = 0; i <= j; ++i) K(i, j) = K(j, i) = 0.5 * (K(i, j) + K(j, i)) / time;
-  }
-  return K;
 }
 
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept {

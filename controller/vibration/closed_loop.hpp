@@ -52,19 +52,10 @@ JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& i
 /// Adds an environment's springs and dampers to those of an impedance.
 void add_environment(const Environment& environment, Impedance& impedance) noexcept;
 
-/// Returns those of an environment, and of a load that adds `load_stiffness`.
-PassivePart passive_part(const Jacobian& J, const Environment& environment,
-                         const JointMatrix& load_stiffness) noexcept;
-
 /// Returns viscous friction less the slope at rest of what compensates friction at the measured
 /// velocity, n, N m s/rad: what the joints damp small motions with where Coulomb friction is left
 /// out. See FeedForward::friction_share.
 JointVector friction_left(const RobotModel& model, const Settings& settings);
-
-/// Returns K_I (n x n, N m/(rad s)): the torque of the integral of these springs grows by -K_I q,
-/// K_I = (K_q + J' K_C J) / time. No entries if the time is zero: there is no integral.
-JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
-                               double time) noexcept;
 
 /// Sets P to N, which projects joint velocities on the null space.
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept;

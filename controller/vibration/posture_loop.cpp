@@ -1,4 +1,5 @@
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/controller/base/joint_algebra.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
@@ -78,6 +79,29 @@ Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector
   return gradient;
 }
 
+PassivePart passive_part(const Jacobian& J, const Environment& environment,
+                         const JointMatrix& load_stiffness) noexcept {
+  PassivePart part{load_stiffness, JointMatrix::Zero(J.cols(), J.cols())};
+  add_congruence(J, environment.tip_stiffness.asDiagonal(), J, part.stiffness);
+  add_congruence(J, environment.tip_damping.asDiagonal(), J, part.damping);
+  part.stiffness.diagonal() += environment.joint_stiffness;
+  part.damping.diagonal() += environment.joint_damping;
+  return part;
+}
+
+JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
+                               double time) noexcept {
+  if (time == 0) return {};
+  const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
+  JointMatrix K = impedance.joint_stiffness;
+  add_congruence(robot.J, K_C, robot.J, K);
+  const Index n = K.rows();
+  for (Index j = 0; j < n; ++j) {
+    for (Index i = 0; i <= j; ++i) K(i, j) = K(j, i) = 0.5 * (K(i, j) + K(j, i)) / time;
+  }
+  return K;
+}
+
 analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period) {
   constexpr double kNothing = 1e-12;  // of the largest eigenvalue
   const Eigen::Index n = K_I.rows();
@@ -88,6 +112,15 @@ analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double pe
   const Eigen::MatrixXd F =
       eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
   return {Eigen::MatrixXd::Identity(rank, rank), period * F.transpose(), F};
+}
+
+std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period) {
+  std::vector<double> decays;
+  for (const analysis::Complex z : sampled.memory) {
+    decays.push_back(-std::log(std::abs(z)) / period);
+  }
+  std::sort(decays.begin(), decays.end());
+  return decays;
 }
 
 SampledArm::SampledArm(const RobotModel& model, const LoopTiming& timing)

@@ -16,15 +16,6 @@ constexpr std::chrono::milliseconds kLook{5};  // how often the thread looks for
 
 }  // namespace
 
-std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period) {
-  std::vector<double> decays;
-  for (const analysis::Complex z : sampled.memory) {
-    decays.push_back(-std::log(std::abs(z)) / period);
-  }
-  std::sort(decays.begin(), decays.end());
-  return decays;
-}
-
 SampledAnalysis::SampledAnalysis(const RobotModel& model, const Settings& settings)
     : arm_(model, timing_of(settings)),
       interval_(static_cast<std::uint64_t>(

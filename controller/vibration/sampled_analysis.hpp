@@ -10,10 +10,6 @@
 
 namespace dashpot::controller {
 
-/// Returns at which rates, 1/s, the slow modes decay that the integral makes, the slowest first;
-/// negative: it grows.
-std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period);
-
 /// Finds, at intervals and on a thread of its own, the modes of the loop with its torque held over
 /// a period (zero-order hold), delayed and filtered, by analysis::sample_loop and
 /// analysis::gain_margin. The thread is needed because this takes milliseconds and allocates.

@@ -2,7 +2,7 @@
 
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/sensitivity.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/python/src/analysis.hpp>
 
 namespace dashpot::python {

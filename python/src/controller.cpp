@@ -57,7 +57,7 @@ void check(std::int32_t code) {
 }
 
 std::unique_ptr<Host> from_text(const std::string& text, const std::string& directory) {
-  const controller::YamlNode document = controller::parse_made_yaml(text);
+  const text::YamlNode document = text::parse_made_yaml(text);
   return std::make_unique<Host>(create_controller(controller::read_config(document, directory)));
 }
 

@@ -3,8 +3,8 @@
 #include <dashpot/analysis/mode.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/log_file.hpp>
-#include <dashpot/lcmtypes/messages/message_check.hpp>
-#include <dashpot/lcmtypes/messages/message_fields.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
+#include <dashpot/lcmtypes/message_fields.hpp>
 #include <dashpot/python/src/convert.hpp>
 
 #include <nanobind/ndarray.h>

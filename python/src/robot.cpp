@@ -1,11 +1,9 @@
 // The robot's dynamics, and its closed loop with springs and dampers.
 
-#include <dashpot/controller/config/config_gains.hpp>
-#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/model/urdf_tree.hpp>
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/rotors.hpp>
@@ -99,14 +97,14 @@ nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& 
 /// The robot of a URDF's text that stands under the key `robot` of another, as in a configuration.
 Robot make_robot(const std::string& urdf, const std::string& text) {
   static constexpr std::array<std::string_view, 1> kKeys = {"robot"};
-  const controller::YamlNode document = controller::parse_made_yaml(text);
+  const text::YamlNode document = text::parse_made_yaml(text);
   return Robot(controller::read_robot({document, "", kKeys}, "", urdf).model());
 }
 
 /// The gains that stand under the key `gains` of a text, as in a configuration.
 Gains make_gains(const Robot& robot, const std::string& text) {
   static constexpr std::array<std::string_view, 1> kKeys = {"gains"};
-  const controller::YamlNode document = controller::parse_made_yaml(text);
+  const text::YamlNode document = text::parse_made_yaml(text);
   return controller::read_gains({document, "", kKeys}, robot.model);
 }
 
@@ -150,7 +148,7 @@ void add_robot(nb::module_& m) {
   using Vector = Eigen::VectorXd;
   m.def("published_drives", &published_drives);
   m.def(
-      "read_urdf", [](const std::string& path) { return controller::read_text(path); },
+      "read_urdf", [](const std::string& path) { return controller::read_urdf_file(path); },
       nb::arg("path"));
   nb::class_<Robot>(m, "Robot", "controller::RobotModel with its DynamicsKernel")
       .def(nb::new_(&make_robot), nb::arg("urdf"), nb::arg("text"))

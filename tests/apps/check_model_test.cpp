@@ -23,8 +23,8 @@ std::string panda_config(const Scratch& scratch) {
                            "control: {mode: joint}  # and so on\n");
 }
 
-const controller::TorqueRecord& panda_record() {
-  static const controller::TorqueRecord record = [] {
+const identification::TorqueRecord& panda_record() {
+  static const identification::TorqueRecord record = [] {
     testing::RecordedArm arm({testing::arm_path("panda"), "panda_link0", "panda_hand_tcp", {}});
     arm.center.resize(7);
     arm.center << 0.2, -0.4, 0.3, -1.9, 0.1, 1.7, 0.6;
@@ -42,7 +42,7 @@ const controller::TorqueRecord& panda_record() {
 /// A CSV file of seven columns of positions called by `position`, and seven of torques.
 std::string csv(const std::function<std::string(int)>& position, double factor,
                 const std::function<std::string(int)>& torque, const std::vector<int>& order) {
-  const controller::TorqueRecord& record = panda_record();
+  const identification::TorqueRecord& record = panda_record();
   std::string text = "time [s]";
   for (const int j : order) text += "," + position(j);
   for (const int j : order) text += "," + torque(j);
@@ -203,7 +203,7 @@ TEST(CheckModelProgram, WritesTheConfigurationAndKeepsTheRest) {
 
 TEST(CheckModelProgram, TakesMeasuredTorquesOfADriversLog) {
   const Scratch scratch;
-  const controller::TorqueRecord& record = panda_record();
+  const identification::TorqueRecord& record = panda_record();
   std::string log;
   const auto add = [&log](std::uint64_t number, int bytes) {
     for (int i = bytes - 1; i >= 0; --i) log += static_cast<char>(number >> (8 * i) & 0xFF);

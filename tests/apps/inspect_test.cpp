@@ -189,7 +189,7 @@ TEST(Inspect, WarnsOfWhatIsDoubtful) {
 
 TEST(Inspect, ShowsLimitsOfVersion12WhereTheyAreStated) {
   const Scratch scratch;
-  std::string text = dashpot::controller::read_text(dashpot::testing::arm_path("panda"));
+  std::string text = dashpot::controller::read_urdf_file(dashpot::testing::arm_path("panda"));
   text.replace(text.find("<robot name=\"panda\">"), 20, "<robot name=\"panda\" version=\"1.2\">");
   text.replace(text.find("effort=\"12\""), 11, "effort=\"12\" acceleration=\"20\" jerk=\"5e3\"");
   const Words words = {"inspect",       "--urdf",      scratch.write("arm.urdf", text),

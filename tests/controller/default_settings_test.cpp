@@ -2,7 +2,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/gain_judge.hpp>
-#include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/tests/support/arms.hpp>
 
 #include <gtest/gtest.h>

@@ -1,6 +1,7 @@
 // The stiffness of an arm that holds a load: against differences of the law's torque and the
 // load's. The simulated counterpart is tests/sim/loaded_modes_test.cpp.
 #include <dashpot/controller/law/impedance_law.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/matrices.hpp>

@@ -78,11 +78,12 @@ TEST(Drives, AreNamedInAConfiguration) {
   const std::string robot = "robot: {urdf: " + testing::arm_path("fr3") +
                             ", base: fr3_link0, tip: fr3_hand_tcp, drives: ";
   const Drives& drives = find_drives("fr3");
-  const RobotModel plain = read_config(parse_yaml(robot + "fr3}"), "").model;
+  const RobotModel plain = read_config(text::parse_yaml(robot + "fr3}"), "").model;
   EXPECT_EQ(plain.joint_values(&Joint::reflected_inertia), drives.values(drives.reflected_inertia));
   EXPECT_EQ(plain.joint_values(&Joint::coulomb_friction),
             fr3().joint_values(&Joint::coulomb_friction));
-  const RobotModel rubs = read_config(parse_yaml(robot + "fr3, drives_friction: true}"), "").model;
+  const RobotModel rubs =
+      read_config(text::parse_yaml(robot + "fr3, drives_friction: true}"), "").model;
   EXPECT_EQ(rubs.joint_values(&Joint::coulomb_friction), drives.values(drives.coulomb_friction));
   EXPECT_EQ(rubs.joint_values(&Joint::viscous_friction), drives.values(drives.viscous_friction));
 }

@@ -33,7 +33,7 @@ using ::testing::ThrowsMessage;
 
 /// The Panda's description with one piece of text in place of another.
 std::string panda_with(const std::string& old, const std::string& next, bool all = false) {
-  static const std::string original = read_text(testing::arm_path("panda"));
+  static const std::string original = read_urdf_file(testing::arm_path("panda"));
   std::string text = original;
   std::size_t at = text.find(old);
   EXPECT_NE(at, std::string::npos) << old;
@@ -142,8 +142,9 @@ TEST(UrdfForms, StateNoLimitByZero) {
 
 /// Where no joint has a limit of effort, nobody commands torques before limits.torque is told.
 TEST(UrdfForms, WantTorquesWhereNoneIsStated) {
-  const RobotModel model = read_panda(std::regex_replace(
-      read_text(testing::arm_path("panda")), std::regex("effort=\"[0-9.]*\""), "effort=\"0\""));
+  const RobotModel model =
+      read_panda(std::regex_replace(read_urdf_file(testing::arm_path("panda")),
+                                    std::regex("effort=\"[0-9.]*\""), "effort=\"0\""));
   EXPECT_THAT(model.warnings(), Contains(HasSubstr("a controller needs limits.torque")));
   Settings settings = default_settings(model);
   EXPECT_THAT([&] { (void)Controller(model, settings); },
@@ -252,7 +253,7 @@ TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
   const auto warnings = [](const auto& change) {
     ModelOptions options;
     change(options);
-    return read_panda(read_text(testing::arm_path("panda")), options).warnings();
+    return read_panda(read_urdf_file(testing::arm_path("panda")), options).warnings();
   };
   using O = ModelOptions;
   for (const auto& [said, change] : std::vector<std::pair<const char*, std::function<void(O&)>>>{

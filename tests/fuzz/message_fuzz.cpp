@@ -1,6 +1,6 @@
 // The input as LCM messages: each type's decoder, and the judge of commands.
 #include <dashpot/lcmtypes/command_filter.hpp>
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/lcmtypes/publish/encode.hpp>
 #include <dashpot/tests/fuzz/fuzz_input.hpp>
 

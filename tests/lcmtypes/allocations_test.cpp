@@ -1,6 +1,6 @@
 // The real-time side allocates nothing, and bytes of unknown origin make nobody allocate much.
 #include <dashpot/lcmtypes/command_receiver.hpp>
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>

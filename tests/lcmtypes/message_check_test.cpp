@@ -1,5 +1,5 @@
 // Bytes of unknown origin never do harm: they decode to what was encoded, or not at all.
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // What the messages say is what the samples said, and their definitions keep their promises.
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
 #include <dashpot/tests/support/places.hpp>
 

@@ -6,10 +6,10 @@
 // half encoders have 12 bits, and velocities steps of 1 mrad/s. No fault may latch.
 #include <dashpot/controller/plugin.h>
 #include <dashpot/controller/config.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/work_round.hpp>
+#include <dashpot/text/yaml_document.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -61,8 +61,8 @@ class Work {
       : name_(arm.name), home_(stress::start_of(arm)), engine_(engine), seen_(seen) {
     const std::string text =
         stress::robot_yaml(arm, 0) + "control: {mode: cartesian}\nanalysis: {where: off}\n";
-    stiffness_ = controller::read_config(controller::parse_yaml(text), "")
-                     .settings.initial.gains.task_stiffness;
+    stiffness_ =
+        controller::read_config(text::parse_yaml(text), "").settings.initial.gains.task_stiffness;
     controller_.reset(dashpot_create_from_text(text.c_str(), ""));
     if (!controller_) throw std::runtime_error(dashpot_last_error());
     const sim::Robot model = stress::simulated_robot(arm);

@@ -1,7 +1,7 @@
 #pragma once
 // Records of an arm's motion and torques, whose mechanics are KDL's.
 
-#include <dashpot/controller/check_model.hpp>
+#include <dashpot/identification/check_model.hpp>
 #include <dashpot/tests/support/dice.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
 
@@ -33,7 +33,7 @@ struct RecordedArm {
   bool without_gravity = false, external_only = false;
   double contact_from = 0, contact_to = 0;  ///< s: a force of 40 N acts at the tip
 
-  controller::TorqueRecord record(std::uint64_t seed) const {
+  identification::TorqueRecord record(std::uint64_t seed) const {
     Dice dice(seed);
     constexpr int kSines = 4;
     const Eigen::MatrixXd phase = 3.0 * dice.matrix(n, kSines), share = dice.matrix(n, kSines);
@@ -43,8 +43,8 @@ struct RecordedArm {
       return known.model();
     }());
     const auto N = static_cast<Eigen::Index>(duration * rate);
-    controller::TorqueRecord result{Eigen::VectorXd(N), Eigen::MatrixXd(n, N),
-                                    Eigen::MatrixXd(n, N)};
+    identification::TorqueRecord result{Eigen::VectorXd(N), Eigen::MatrixXd(n, N),
+                                        Eigen::MatrixXd(n, N)};
     Eigen::VectorXd drift = slow_noise * dice.vector(n);
     const double keep = std::exp(-1 / (0.3 * rate));
     for (Eigen::Index i = 0; i < N; ++i) {

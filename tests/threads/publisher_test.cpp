@@ -1,5 +1,5 @@
 // What the real-time thread offers is published once, in order, and never holds it up.
-#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
 

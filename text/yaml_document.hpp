@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 
 /// One value of a YAML document, with its place. Aliases are already replaced by what they name.
 struct YamlNode {
@@ -15,7 +15,7 @@ struct YamlNode {
 };
 
 /// The bytes of the file at `path`, or of standard input if it is "-". Throws InputError.
-std::string read_file(const std::string& path);
+std::string read_input(const std::string& path);
 
 /// Reads a file, but no pipes and devices, which may never end or keep the caller waiting.
 std::string read_regular_file(const std::string& path);
@@ -26,4 +26,4 @@ YamlNode parse_yaml(const std::string& text);
 /// The same, of text that a program made: errors name no lines.
 YamlNode parse_made_yaml(const std::string& text);
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

@@ -1,11 +1,11 @@
-#include <dashpot/controller/yaml/quantity.hpp>
-#include <dashpot/controller/yaml/yaml_mapping.hpp>
+#include <dashpot/text/quantity.hpp>
+#include <dashpot/text/yaml_mapping.hpp>
 
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 namespace {
 
 std::string join(std::span<const std::string_view> words) {
@@ -173,4 +173,4 @@ std::optional<std::vector<Eigen::MatrixXd>> YamlMapping::matrices(std::string_vi
   return result;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

@@ -1,7 +1,6 @@
 #pragma once
-#include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/robot_types.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
+#include <dashpot/text/wrong_input.hpp>
+#include <dashpot/text/yaml_document.hpp>
 
 #include <Eigen/Core>
 #include <map>
@@ -11,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 
 /// "a list", "'12 m'", ...: a value in an error message.
 std::string describe(const YamlNode& node);
@@ -61,4 +60,4 @@ class YamlMapping {
   std::map<std::string_view, const YamlNode*> values_;
 };
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

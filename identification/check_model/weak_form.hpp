@@ -1,8 +1,8 @@
 #pragma once
-#include <dashpot/controller/check_model/smoothed_record.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/identification/check_model/smoothed_record.hpp>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 
 /// Torques of a model over windows, N m.
 struct WindowTorques {
@@ -31,7 +31,7 @@ class WeakForm {
 
   /// The model's torques: -integral f' p - integral f (Mdot qd - C qd), and integral f g. A joint
   /// of the chain that the kernel has not, a chain being shorter, has zeros.
-  WindowTorques torques(const DynamicsKernel& kernel, Eigen::Index joints) const;
+  WindowTorques torques(const controller::DynamicsKernel& kernel, Eigen::Index joints) const;
 
   /// -integral f' qd: what a unit of reflected inertia takes.
   Eigen::MatrixXd acceleration() const;
@@ -55,4 +55,4 @@ class WeakForm {
   Eigen::VectorXd f_, slope_;  ///< at the 2 m + 1 samples, times the step
 };
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

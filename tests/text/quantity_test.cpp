@@ -1,5 +1,5 @@
 // Numbers with units: what they are worth in SI, and what is refused.
-#include <dashpot/controller/yaml/quantity.hpp>
+#include <dashpot/text/quantity.hpp>
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -92,4 +92,4 @@ TEST(Quantity, RefusesWhatIsNoNumber) {
 }
 
 }  // namespace
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

@@ -1,11 +1,11 @@
-#include <dashpot/controller/yaml/setting_reader.hpp>
+#include <dashpot/text/setting_reader.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <sstream>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 namespace {
 
 std::string to_text(double value) {
@@ -144,4 +144,4 @@ std::size_t find_word(const YamlMapping& keys, std::string_view key, const YamlN
                    node.line);
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

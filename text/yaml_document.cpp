@@ -1,5 +1,5 @@
-#include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/yaml/yaml_document.hpp>
+#include <dashpot/text/wrong_input.hpp>
+#include <dashpot/text/yaml_document.hpp>
 
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
@@ -15,7 +15,7 @@
 #include <system_error>
 #include <utility>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 namespace {
 
 // yaml-cpp keeps unfinished tokens (about 130 bytes each) and recurses into nested values, so both
@@ -139,7 +139,7 @@ class TreeBuilder : public YAML::EventHandler {
 
 }  // namespace
 
-std::string read_file(const std::string& path) {
+std::string read_input(const std::string& path) {
   const auto close = [](std::FILE* file) { return file == stdin ? 0 : std::fclose(file); };
   const std::unique_ptr<std::FILE, decltype(close)> file(
       path == "-" ? stdin : std::fopen(path.c_str(), "rb"), close);
@@ -164,7 +164,7 @@ std::string read_regular_file(const std::string& path) {
   if (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status)) {
     throw InputError("", "is not a regular file");
   }
-  return read_file(path);
+  return read_input(path);
 }
 
 YamlNode parse_yaml(const std::string& text) {
@@ -206,4 +206,4 @@ YamlNode parse_made_yaml(const std::string& text) {
   return document;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

@@ -1,11 +1,11 @@
-#include <dashpot/controller/check_model/smoothed_record.hpp>
+#include <dashpot/identification/check_model/smoothed_record.hpp>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 namespace {
 
 using Eigen::Index;
@@ -250,4 +250,4 @@ std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const Re
   return runs;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

@@ -1,9 +1,9 @@
 #pragma once
-#include <dashpot/controller/torque_record.hpp>
+#include <dashpot/identification/torque_record.hpp>
 
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 
 /// How records are smoothed: local cubic polynomials over `half_width` to either side.
 struct RecordFilter {
@@ -27,4 +27,4 @@ RecordFilter choose_smoothing(const std::vector<TorqueRecord>& records);
 /// takes from one side of the equations of motion it takes from the other.
 std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const RecordFilter& how);
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

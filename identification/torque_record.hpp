@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 
 /// A recorded motion of an arm, with the torques of its joints, in the model's order and signs.
 struct TorqueRecord {
@@ -21,4 +21,4 @@ enum class TorqueKind : std::uint8_t {
   kExternal,        ///< only what the robot's own model does not explain
 };
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

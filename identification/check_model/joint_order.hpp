@@ -1,10 +1,10 @@
 #pragma once
-#include <dashpot/controller/check_model/weak_form.hpp>
+#include <dashpot/identification/check_model/weak_form.hpp>
 
 #include <string>
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 
 /// Which column with which sign is taken for each joint.
 struct ColumnOrder {
@@ -30,7 +30,7 @@ struct JointOrder {
 /// Tries the kinds of torque, exchanged columns and signs on a part of the motion. What is as it
 /// should be is only doubted where something else leaves a seventh of the variance over, at one
 /// joint, or as little at several together.
-JointOrder find_order(const RobotModel& model, const std::vector<SmoothRun>& runs,
+JointOrder find_order(const controller::RobotModel& model, const std::vector<SmoothRun>& runs,
                       const RecordFilter& how);
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

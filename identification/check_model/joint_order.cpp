@@ -1,11 +1,11 @@
-#include <dashpot/controller/check_model/joint_order.hpp>
+#include <dashpot/identification/check_model/joint_order.hpp>
 
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 namespace {
 
 using Eigen::Index;
@@ -61,7 +61,8 @@ double left_over(const VectorXd& y, const VectorXd& sign, const VectorXd& veloci
 
 class OrderSearch {
  public:
-  OrderSearch(const RobotModel& model, const std::vector<SmoothRun>& runs, const RecordFilter& how)
+  OrderSearch(const controller::RobotModel& model, const std::vector<SmoothRun>& runs,
+              const RecordFilter& how)
       : kernel_(model), how_(how) {
     // Some windows are enough to see what is far better.
     constexpr std::size_t kMost = 80;
@@ -163,7 +164,7 @@ class OrderSearch {
     return at->second;
   }
 
-  DynamicsKernel kernel_;
+  controller::DynamicsKernel kernel_;
   RecordFilter how_;
   std::vector<SmoothRun> part_;
   MatrixXd torque_;  ///< of the windows, as the columns are
@@ -235,7 +236,7 @@ std::vector<Index> JointOrder::joints() const {
   return doubted;
 }
 
-JointOrder find_order(const RobotModel& model, const std::vector<SmoothRun>& runs,
+JointOrder find_order(const controller::RobotModel& model, const std::vector<SmoothRun>& runs,
                       const RecordFilter& how) {
   OrderSearch search(model, runs, how);
   Guess best = search.as_it_is(TorqueKind::kExternal);
@@ -246,4 +247,4 @@ JointOrder find_order(const RobotModel& model, const std::vector<SmoothRun>& run
   return best.order;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

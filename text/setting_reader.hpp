@@ -2,9 +2,8 @@
 // Reads one setting each. Where the key is not there, the value keeps what it holds: its default.
 // Everything wrong is an InputError that names key, entry, value, unit and line.
 
-#include <dashpot/controller/base/range.hpp>
-#include <dashpot/controller/robot_types.hpp>
-#include <dashpot/controller/yaml/yaml_mapping.hpp>
+#include <dashpot/text/range.hpp>
+#include <dashpot/text/yaml_mapping.hpp>
 
 #include <Eigen/Core>
 #include <array>
@@ -14,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 
 inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 
@@ -59,4 +58,4 @@ void read_choice(const YamlMapping& keys, std::string_view key,
   value = choices[find_word(keys, key, *node, words)].second;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 
 /// The number that `text` writes, in the SI unit `unit`: "30 deg" wanted in "rad" is 0.5236.
 /// Without a unit of its own, `text` is taken to be in `unit` ("" if there is none). Known are g,
@@ -20,4 +20,4 @@ double parse_quantity(std::string_view text, const std::string& unit);
 void refuse_mixed_angles(const std::vector<std::string>& texts,
                          const std::vector<std::string>& units);
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

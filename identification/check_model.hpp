@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/controller/robot_description.hpp>
-#include <dashpot/controller/torque_record.hpp>
+#include <dashpot/identification/torque_record.hpp>
 
 #include <array>
 #include <limits>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 
 /// A fitted parameter. The truth lies within 1.96 deviations of the value in 95 of 100 cases.
 struct Estimate {
@@ -69,6 +69,7 @@ struct ModelCheck {
 ///
 /// Throws std::invalid_argument, with a sentence, for records of other sizes, or which are too
 /// short or not sampled often enough, and InvalidModel.
-ModelCheck check_model(const RobotDescription& robot, const std::vector<TorqueRecord>& records);
+ModelCheck check_model(const controller::RobotDescription& robot,
+                       const std::vector<TorqueRecord>& records);
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

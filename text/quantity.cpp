@@ -1,4 +1,4 @@
-#include <dashpot/controller/yaml/quantity.hpp>
+#include <dashpot/text/quantity.hpp>
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 namespace {
 
 /// A factor times powers of kg, m, s and rad.
@@ -167,4 +167,4 @@ void refuse_mixed_angles(const std::vector<std::string>& texts,
   }
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

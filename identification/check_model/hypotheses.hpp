@@ -1,11 +1,11 @@
 #pragma once
-#include <dashpot/controller/check_model/weak_form.hpp>
 #include <dashpot/controller/robot_description.hpp>
+#include <dashpot/identification/check_model/weak_form.hpp>
 
 #include <string>
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 
 /// Something that may be wrong with the model or a sensor, and what it would add to the torques.
 struct Hypothesis {
@@ -18,13 +18,14 @@ struct Hypothesis {
 
 /// A link's mass and where its centre is, reflected inertias, and torques with a wrong scale.
 /// `model_torque` is n x K.
-std::vector<Hypothesis> list_hypotheses(const RobotDescription& robot, const RobotModel& model,
-                                        const WeakForm& form, const Eigen::MatrixXd& model_torque);
+std::vector<Hypothesis> list_hypotheses(const controller::RobotDescription& robot,
+                                        const controller::RobotModel& model, const WeakForm& form,
+                                        const Eigen::MatrixXd& model_torque);
 
 /// Returns what a unit of mass (1), first moment (3) and inertia about the origin (6: xx yy zz xy
 /// xz yz), fixed to the tip link of `model`, takes in torques, n x K each: the first `count` of
 /// them.
-std::vector<Eigen::MatrixXd> body_columns(const RobotModel& model, const WeakForm& form,
+std::vector<Eigen::MatrixXd> body_columns(const controller::RobotModel& model, const WeakForm& form,
                                           std::size_t count);
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

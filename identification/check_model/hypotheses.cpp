@@ -1,7 +1,7 @@
-#include <dashpot/controller/check_model/hypotheses.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/identification/check_model/hypotheses.hpp>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 namespace {
 
 using Eigen::Index;
@@ -12,23 +12,25 @@ MatrixXd sum_of(const WindowTorques& torques) {
 }
 
 /// The chain from the base to the link that joint j moves; without anything attached.
-RobotModel part_of_arm(const RobotDescription& robot, const RobotModel& model, int joint) {
-  RobotDescription part = robot;
-  ModelOptions& options = part.options;
+controller::RobotModel part_of_arm(const controller::RobotDescription& robot,
+                                   const controller::RobotModel& model, int joint) {
+  controller::RobotDescription part = robot;
+  controller::ModelOptions& options = part.options;
   options.payload = {};
   options.tool = {};
   options.drives.clear();
   options.drives_friction = false;
   options.accept_inertias = true;
   options.include_off_chain = true;  // which includes all beyond the link
-  options.reflected_inertia = model.joint_values(&Joint::reflected_inertia).head(joint + 1);
+  options.reflected_inertia =
+      model.joint_values(&controller::Joint::reflected_inertia).head(joint + 1);
   options.viscous_friction = options.coulomb_friction = {};
   part.tip = kdl_chain(model).getSegment(static_cast<unsigned>(joint)).getName();
   return part.model();
 }
 
-Attachment body_of(const KDL::RigidBodyInertia& body) {
-  Attachment attachment;
+controller::Attachment body_of(const KDL::RigidBodyInertia& body) {
+  controller::Attachment attachment;
   attachment.mass = body.getMass();
   const KDL::Vector center = body.getCOG();
   for (int i = 0; i < 3; ++i) attachment.first_moment[i] = attachment.mass * center[i];
@@ -39,16 +41,16 @@ Attachment body_of(const KDL::RigidBodyInertia& body) {
 
 }  // namespace
 
-std::vector<MatrixXd> body_columns(const RobotModel& model, const WeakForm& form,
+std::vector<MatrixXd> body_columns(const controller::RobotModel& model, const WeakForm& form,
                                    std::size_t count) {
   constexpr std::array<std::array<int, 2>, 6> kEntries{
       {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
-  DynamicsKernel kernel(model);
+  controller::DynamicsKernel kernel(model);
   kernel.attach({});
   const MatrixXd bare = sum_of(form.torques(kernel, model.dof()));
   std::vector<MatrixXd> columns;
   for (std::size_t i = 0; i < count; ++i) {
-    Attachment unit;
+    controller::Attachment unit;
     if (i == 0) {
       unit.mass = 1;
     } else if (i < 4) {
@@ -63,30 +65,31 @@ std::vector<MatrixXd> body_columns(const RobotModel& model, const WeakForm& form
   return columns;
 }
 
-std::vector<Hypothesis> list_hypotheses(const RobotDescription& robot, const RobotModel& model,
-                                        const WeakForm& form, const MatrixXd& model_torque) {
+std::vector<Hypothesis> list_hypotheses(const controller::RobotDescription& robot,
+                                        const controller::RobotModel& model, const WeakForm& form,
+                                        const MatrixXd& model_torque) {
   std::vector<Hypothesis> all;
   const int n = model.dof();
   const MatrixXd acceleration = form.acceleration();
   for (int j = 0; j < n; ++j) {
-    const Joint& joint = model.joints()[static_cast<std::size_t>(j)];
+    const controller::Joint& joint = model.joints()[static_cast<std::size_t>(j)];
     const auto row_alone = [&](const MatrixXd& of) {
       MatrixXd column = MatrixXd::Zero(n, form.count());
       column.row(j) = of.row(j);
       return column;
     };
-    const bool slides = joint.type == JointType::kPrismatic;
+    const bool slides = joint.type == controller::JointType::kPrismatic;
     all.push_back(
         {j, {row_alone(acceleration)}, "its reflected inertia is", slides ? "kg" : "kg m^2", 1});
     all.push_back({j, {row_alone(model_torque)}, "its torque reads", "%", 100});
     if (j + 1 == n) break;  // what the last link lacks is part of the payload
     const KDL::Segment& segment = kdl_chain(model).getSegment(static_cast<unsigned>(j));
-    const RobotModel part = part_of_arm(robot, model, j);
+    const controller::RobotModel part = part_of_arm(robot, model, j);
     std::vector<MatrixXd> columns = body_columns(part, form, 4);
-    const Attachment link = body_of(segment.getInertia());
+    const controller::Attachment link = body_of(segment.getInertia());
     const std::string name = "'" + segment.getName() + "'";
     if (link.mass > 0) {
-      DynamicsKernel kernel(part);
+      controller::DynamicsKernel kernel(part);
       kernel.attach({});
       const MatrixXd bare = sum_of(form.torques(kernel, j + 1));
       kernel.attach(link);
@@ -99,4 +102,4 @@ std::vector<Hypothesis> list_hypotheses(const RobotDescription& robot, const Rob
   return all;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 
 /// A linear model of torques: row k n + j belongs to joint j in window k.
 struct LinearModel {
@@ -38,4 +38,4 @@ struct RobustFit {
 /// repeats with a periodic motion and so is always in step with it.
 RobustFit robust_fit(const LinearModel& model);
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

@@ -1,10 +1,10 @@
-#include <dashpot/controller/check_model/weak_form.hpp>
+#include <dashpot/identification/check_model/weak_form.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -15,9 +15,9 @@ namespace {
 /// p = M qd, dL/dq + g = Mdot qd - C qd, and g at one state.
 class LagrangianTerms {
  public:
-  explicit LagrangianTerms(const DynamicsKernel& kernel) : kernel_(kernel) {}
+  explicit LagrangianTerms(const controller::DynamicsKernel& kernel) : kernel_(kernel) {}
 
-  void evaluate(const JointVector& q, const JointVector& qd) {
+  void evaluate(const controller::JointVector& q, const controller::JointVector& qd) {
     kernel_.evaluate(q, qd, at_);
     p.noalias() = at_.M * qd;
     gravity = at_.gravity;
@@ -36,11 +36,11 @@ class LagrangianTerms {
     slope.noalias() -= at_.M * qd / (2 * s);
   }
 
-  JointVector p, slope, gravity;
+  controller::JointVector p, slope, gravity;
 
  private:
-  const DynamicsKernel& kernel_;
-  DynamicsResult at_;
+  const controller::DynamicsKernel& kernel_;
+  controller::DynamicsResult at_;
 };
 
 }  // namespace
@@ -110,7 +110,7 @@ MatrixXd WeakForm::slow_share(const VectorXd& v0) const {
   });
 }
 
-WindowTorques WeakForm::torques(const DynamicsKernel& kernel, Index joints) const {
+WindowTorques WeakForm::torques(const controller::DynamicsKernel& kernel, Index joints) const {
   WindowTorques result;
   if (windows_.empty()) return result;
   const Index n = runs_->front().position.rows();
@@ -140,4 +140,4 @@ WindowTorques WeakForm::torques(const DynamicsKernel& kernel, Index joints) cons
   return result;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

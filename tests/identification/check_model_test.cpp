@@ -1,5 +1,5 @@
 // What records of torques say of a model, where the truth is known.
-#include <dashpot/controller/check_model.hpp>
+#include <dashpot/identification/check_model.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
@@ -11,7 +11,7 @@
 #include <fstream>
 #include <sstream>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 namespace {
 
 using ::testing::ElementsAre;
@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::RecordedArm;
 
-RobotDescription description_of(const testing::Arm& arm) {
+controller::RobotDescription description_of(const testing::Arm& arm) {
   return {testing::arm_path(arm.file), arm.base, arm.tip, {}};
 }
 
@@ -37,7 +37,7 @@ RecordedArm loaded_panda() {
   return arm;
 }
 
-RobotDescription panda() {
+controller::RobotDescription panda() {
   return description_of(testing::arms()[0]);
 }
 
@@ -54,7 +54,7 @@ std::pair<int, int> inside(const ModelCheck& check, const RecordedArm& arm, doub
     count(check.joints[j].coulomb_friction, arm.coulomb[i]);
     count(check.joints[j].viscous_friction, arm.viscous[i]);
   }
-  const Payload& payload = arm.description.options.payload;
+  const controller::Payload& payload = arm.description.options.payload;
   count(check.payload.mass, payload.mass);
   for (std::size_t i = 0; i < 3; ++i) {
     count(check.payload.center[i], payload.center[static_cast<Eigen::Index>(i)]);
@@ -258,7 +258,8 @@ TEST(CheckModel, NamesExchangedColumnsAndWrongSigns) {
 }
 
 /// The Panda's description with another mass of a link, in a file.
-RobotDescription with_mass(const tests::Scratch& scratch, const std::string& link, double factor) {
+controller::RobotDescription with_mass(const tests::Scratch& scratch, const std::string& link,
+                                       double factor) {
   std::ifstream file(panda().urdf);
   std::stringstream text;
   text << file.rdbuf();
@@ -267,7 +268,7 @@ RobotDescription with_mass(const tests::Scratch& scratch, const std::string& lin
   at = urdf.find("<mass value=\"", at) + 13;
   const auto end = urdf.find('"', at);
   urdf.replace(at, end - at, std::to_string(factor * std::stod(urdf.substr(at, end - at))));
-  RobotDescription robot = panda();
+  controller::RobotDescription robot = panda();
   robot.urdf = scratch.write("panda.urdf", urdf);
   robot.options.accept_inertias = true;
   return robot;
@@ -341,4 +342,4 @@ TEST(CheckModel, RefusesWhatIsNoRecord) {
 }
 
 }  // namespace
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

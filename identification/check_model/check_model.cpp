@@ -1,15 +1,15 @@
-#include <dashpot/controller/check_model.hpp>
-#include <dashpot/controller/check_model/hypotheses.hpp>
-#include <dashpot/controller/check_model/joint_order.hpp>
-#include <dashpot/controller/check_model/robust_fit.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/identification/check_model.hpp>
+#include <dashpot/identification/check_model/hypotheses.hpp>
+#include <dashpot/identification/check_model/joint_order.hpp>
+#include <dashpot/identification/check_model/robust_fit.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 namespace {
 
 using Eigen::Index;
@@ -52,10 +52,10 @@ std::string number_text(double value, const char* format = "%.2g") {
 /// The parameters and the rows of the fit.
 class Fitting {
  public:
-  Fitting(const RobotModel& model, const std::vector<SmoothRun>& runs, const RecordFilter& how,
-          const WeakForm& form)
+  Fitting(const controller::RobotModel& model, const std::vector<SmoothRun>& runs,
+          const RecordFilter& how, const WeakForm& form)
       : model_(model), form_(form), n_(model.dof()), K_(form.count()), tau_(form.torque()) {
-    own_ = form.torques(DynamicsKernel(model), n_);
+    own_ = form.torques(controller::DynamicsKernel(model), n_);
     largest_ = tau_.cwiseAbs().rowwise().maxCoeff();
 
     VectorXd v0(n_), slow(n_);
@@ -65,7 +65,8 @@ class Fitting {
         fastest = std::max(fastest, run.velocity.row(j).cwiseAbs().maxCoeff());
       }
       v0[j] = std::max({3 * how.rate_noise[j], 0.01 * fastest, 1e-12});
-      const bool slides = model.joints()[static_cast<std::size_t>(j)].type == JointType::kPrismatic;
+      const bool slides =
+          model.joints()[static_cast<std::size_t>(j)].type == controller::JointType::kPrismatic;
       // Below this gears stick and slip, and lubricants have no film yet: rad/s, m/s.
       const double creeping = slides ? 0.005 : 0.02;
       slow[j] = std::max({v0[j], 0.05 * fastest, creeping});
@@ -130,7 +131,7 @@ class Fitting {
   }
 
   /// After a fit, adds the hypothesis that explains most, as long as one explains much.
-  void explain(const RobotDescription& robot, ModelCheck& check) {
+  void explain(const controller::RobotDescription& robot, ModelCheck& check) {
     hypotheses_ = list_hypotheses(robot, model_, form_, model_torque_);
     if (kind_ != TorqueKind::kWhole) {  // which says little of what the robot holds by itself
       std::erase_if(hypotheses_, [](const Hypothesis& h) { return h.what == "its torque reads"; });
@@ -273,7 +274,7 @@ class Fitting {
   }
 
   void report_payload(ModelCheck& check) const {
-    const Attachment& before = model_.attachment();
+    const controller::Attachment& before = model_.attachment();
     const Index first = 3 * n_;
     const double mass = before.mass + result_.value[first];
     const Eigen::Vector3d moment = before.first_moment + result_.value.segment<3>(first + 1);
@@ -464,7 +465,7 @@ class Fitting {
     return fastest > 0 ? largest_[j] / fastest : 0;
   }
 
-  const RobotModel& model_;
+  const controller::RobotModel& model_;
   const WeakForm& form_;
   Index n_, K_;
   TorqueKind kind_ = TorqueKind::kWhole;
@@ -481,8 +482,9 @@ class Fitting {
 
 }  // namespace
 
-ModelCheck check_model(const RobotDescription& robot, const std::vector<TorqueRecord>& records) {
-  const RobotModel model = robot.model();
+ModelCheck check_model(const controller::RobotDescription& robot,
+                       const std::vector<TorqueRecord>& records) {
+  const controller::RobotModel model = robot.model();
   check_sizes(records, model.dof());
   const RecordFilter how = choose_smoothing(records);
   const std::vector<SmoothRun> runs = smooth(records, how);
@@ -511,15 +513,15 @@ ModelCheck check_model(const RobotDescription& robot, const std::vector<TorqueRe
   constexpr double kMuchLeft = 0.05;
   fitting.fit(check.kind);
   if (check.kind != TorqueKind::kWhole || fitting.most_left() > kMuchLeft) {
-    RobotDescription hung = robot;  // from a ceiling, or at a wall
+    controller::RobotDescription hung = robot;  // from a ceiling, or at a wall
     double least = best - kFarBetter;
     bool fits = false;
     for (int k = 0; k < 6; ++k) {
-      RobotDescription other = robot;
+      controller::RobotDescription other = robot;
       other.options.gravity =
           (k < 3 ? 1 : -1) * robot.options.gravity.norm() * Eigen::Vector3d::Unit(k % 3) +
           Eigen::Vector3d::Zero();  // no zero with a sign
-      const RobotModel hanging = other.model();
+      const controller::RobotModel hanging = other.model();
       Fitting there(hanging, runs, how, form);
       const double score = there.fit(TorqueKind::kWhole);
       if (score < least) least = score, hung = other, fits = there.most_left() <= kMuchLeft;
@@ -553,4 +555,4 @@ ModelCheck check_model(const RobotDescription& robot, const std::vector<TorqueRe
   return check;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification

@@ -4,7 +4,7 @@
 #include <sstream>
 #include <string>
 
-namespace dashpot::controller {
+namespace dashpot::text {
 
 /// Values that a number may have. Infinity never belongs to them.
 struct Range {
@@ -37,4 +37,4 @@ inline std::string complaint(const Range& range, double value, const std::string
   return text.str();
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::text

@@ -1,4 +1,4 @@
-#include <dashpot/controller/check_model/robust_fit.hpp>
+#include <dashpot/identification/check_model/robust_fit.hpp>
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace dashpot::controller {
+namespace dashpot::identification {
 namespace {
 
 using Eigen::Index;
@@ -202,4 +202,4 @@ RobustFit robust_fit(const LinearModel& model) {
   return fit;
 }
 
-}  // namespace dashpot::controller
+}  // namespace dashpot::identification
