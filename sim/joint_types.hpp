@@ -3,14 +3,7 @@
 // Frames: B is the base link, T the tip. p_BT_B is the position of T in B, expressed in B's axes;
 // R_BT turns T's axes into B's. Twists and wrenches have the linear part first, then the angular.
 
-#if !defined(EIGEN_MAX_ALIGN_BYTES) || EIGEN_MAX_ALIGN_BYTES != 64 || \
-    !defined(EIGEN_MAX_STATIC_ALIGN_BYTES) || EIGEN_MAX_STATIC_ALIGN_BYTES != 64
-#error \
-    "the libraries lay out Eigen's types otherwise: add -DEIGEN_MAX_ALIGN_BYTES=64 \
--DEIGEN_MAX_STATIC_ALIGN_BYTES=64, or use the CMake targets or the pkg-config files"
-#endif
-
-#include <Eigen/Core>
+#include <dashpot/text/aligned_eigen.hpp>
 
 namespace dashpot::sim {
 

@@ -2,10 +2,10 @@
 // Reads one setting each. Where the key is not there, the value keeps what it holds: its default.
 // Everything wrong is an InputError that names key, entry, value, unit and line.
 
+#include <dashpot/text/aligned_eigen.hpp>
 #include <dashpot/text/range.hpp>
 #include <dashpot/text/yaml_mapping.hpp>
 
-#include <Eigen/Core>
 #include <array>
 #include <limits>
 #include <string>

@@ -1,8 +1,8 @@
 #pragma once
+#include <dashpot/text/aligned_eigen.hpp>
 #include <dashpot/text/wrong_input.hpp>
 #include <dashpot/text/yaml_document.hpp>
 
-#include <Eigen/Core>
 #include <map>
 #include <optional>
 #include <span>

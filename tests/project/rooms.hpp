@@ -98,7 +98,7 @@ inline const std::vector<Room>& rooms() {
       {"sim/base",
        0,
        {"joint_types", "step_status", "simulated_system", "schedule", "invalid_scene"},
-       {kEigen}},
+       {kText, kEigen}},
       {"sim/dynamics",
        1,
        {"robot", "arm", "linear_system"},
