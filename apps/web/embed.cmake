@@ -1,17 +1,14 @@
 # Writes the files of page/, and a document that it links to, into a source file, as the program
-# serves them: cmake -P, with OUT, PAGE.
+# serves them at their paths: cmake -P, with OUT, PAGE.
+set(type_html text/html)
+set(type_css text/css)
+set(type_js text/javascript)
+set(type_svg image/svg+xml)
+set(type_md text/plain)
 set(text "#include <dashpot/apps/web/web_site.hpp>\n\nnamespace dashpot::apps {\nnamespace {\n")
 set(table "")
-foreach(entry IN ITEMS "index.html:text/html" "style.css:text/css" "main.js:text/javascript"
-    "draw.js:text/javascript" "arm.js:text/javascript" "poles.js:text/javascript"
-    "curves.js:text/javascript" "tune.html:text/html" "tune.css:text/css"
-    "tune.js:text/javascript" "tune_arm.js:text/javascript" "tune_form.js:text/javascript"
-    "tune_gains.js:text/javascript" "tune_state.js:text/javascript" "tune_text.js:text/javascript"
-    "panels.js:text/javascript" "advice.js:text/javascript"
-    "icon.svg:image/svg+xml" "../../../docs/safety.md:text/plain")
-  string(REPLACE ":" ";" entry ${entry})
-  list(GET entry 0 name)
-  list(GET entry 1 type)
+file(GLOB_RECURSE names RELATIVE ${PAGE} ${PAGE}/*)
+foreach(name IN LISTS names ITEMS ../../../docs/safety.md)
   file(READ ${PAGE}/${name} hex HEX)
   string(LENGTH "${hex}" length)
   math(EXPR length "${length} / 2")
@@ -19,13 +16,12 @@ foreach(entry IN ITEMS "index.html:text/html" "style.css:text/css" "main.js:text
   string(REGEX REPLACE "(................................................................................)" "\\1\"\n  \"" hex "${hex}")
   string(MAKE_C_IDENTIFIER ${name} id)
   string(APPEND text "constexpr char k_${id}[] =\n  \"${hex}\";\n")
-  get_filename_component(file ${name} NAME)
-  set(path "/${file}")
-  if(name STREQUAL "index.html")
-    set(path "/")
-  endif()
+  string(REGEX REPLACE "^[./]+docs/" "" path ${name})
+  string(REGEX REPLACE "^index.html$" "" path ${path})
+  get_filename_component(end ${name} LAST_EXT)
+  string(REPLACE "." "type_" type ${end})
   string(APPEND table
-    "    {\"${path}\", \"${type}; charset=utf-8\", {k_${id}, ${length}}},\n")
+    "    {\"/${path}\", \"${${type}}; charset=utf-8\", {k_${id}, ${length}}},\n")
 endforeach()
 string(APPEND text "constexpr PageFile kPageFiles[] = {\n${table}};\n}  // namespace\n
 const PageFile* find_page_file(std::string_view path) {

@@ -13,7 +13,7 @@
 
 namespace dashpot::apps {
 
-/// The file of the page at a path ("/main.js"), and its type; nothing at any other path. They are
+/// The file of the page at a path ("/monitor/main.js"), and its type; nothing at any other path. They are
 /// part of the program.
 struct PageFile {
   std::string_view path, type, text;

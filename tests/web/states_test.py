@@ -135,9 +135,9 @@ class States(PageTest):
             texts = re.findall(r'case Status::k(\w+):\s+return "([^"]*)"', file.read())
         faults = [text for name, text in texts[[name for name, _ in texts].index('FaultLatched') + 1:]]
         self.assertEqual(len(faults), 17)
-        said = [self.browser.value(f"import('/advice.js').then((m) => m.faultAdvice({text!r}))") for text in faults]
+        said = [self.browser.value(f"import('/monitor/notices.js').then((m) => m.faultAdvice({text!r}))") for text in faults]
         self.assertEqual(len(set(said)), 17)
-        self.assertNotIn(self.browser.value("import('/advice.js').then((m) => m.faultAdvice('?'))"), said)
+        self.assertNotIn(self.browser.value("import('/monitor/notices.js').then((m) => m.faultAdvice('?'))"), said)
         self.seek(0.5)
         self.browser.until("document.getElementById('fault').hidden")
         site.stop()
@@ -180,7 +180,7 @@ class States(PageTest):
         self.browser.until("document.querySelectorAll('#rows tr').length == 16")
         kinds = self.browser.value("[...document.querySelectorAll('#rows tr')].map((r) => r.cells[3].className)")
         self.assertEqual(kinds, ['good'] * JOINTS)
-        judged = self.browser.value('''import('/panels.js').then((m) => [m.judge(0.69, 0.7), m.judge(0.6, 0.7),
+        judged = self.browser.value('''import('/monitor/tables.js').then((m) => [m.judge(0.69, 0.7), m.judge(0.6, 0.7),
             m.judge(0.6, 0), m.judge(-0.1, 0), m.judge(null, 0.7)])''')
         self.assertEqual(judged, ['good', 'bad', '', 'bad', 'none'])
         site.stop()
@@ -233,7 +233,7 @@ class States(PageTest):
         self.browser.value(f"{event}('pointerleave', 0)")
         self.browser.until("document.querySelector('.hint').hidden")
         # Ticks of a logarithmic axis.
-        ticks = "import('/draw.js').then((m) => m.logTicks({}))"
+        ticks = "import('/shared/axes.js').then((m) => m.logTicks({}))"
         self.assertEqual(self.browser.value(ticks.format('0.5, 200, 12')), [.5, 1, 2, 5, 10, 20, 50, 100, 200])
         self.assertEqual(self.browser.value(ticks.format('1e-6, 1e6, 6')), [10 ** e for e in range(-6, 7, 2)])
         self.assertGreaterEqual(len(self.browser.value(ticks.format('9.7, 10.9, 4'))), 3)

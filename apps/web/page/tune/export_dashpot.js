@@ -1,0 +1,143 @@
+// A design as a text for Dashpot. `of` is {setup, q, design, answer}: what the program was asked, and what it said.
+import {rounded} from '../shared/numbers.js';
+import {asRows, compact, diagonal, isDiagonal} from './matrices.js';
+
+const kDiffers = 'the modes differ from those on the page.';
+const json = JSON.stringify;
+export const notes = (lines) => lines.filter(Boolean).map((line) => `# ${line}\n`).join('');
+
+/// The damping of the null space that acts, where it is no ratio.
+export function nullDamping({null_damping: damping, null_stiffness: stiffness}) {
+  return Array.isArray(damping) ? damping : stiffness.map((k) => (damping.factor || 0) * Math.sqrt(k));
+}
+
+/// What the keys of a configuration's `robot` say of the arm: those that the program was started with, and what the page
+/// has in their place.
+function armKeys({setup, design}) {
+  const arm = design.arm || {}, keys = {...setup.robot.keys};
+  for (const [key, value] of Object.entries(arm)) {
+    if (value) keys[key] = key === 'gear_stiffness' ? value.map((k) => k || 'none') : value;
+  }
+  if (arm.reflected_inertia) delete keys.drives;
+  if (!keys.gear_stiffness) delete keys.gear_damping;
+  return keys;
+}
+
+/// The rotors' inertia that acts, or null where there is none.
+function rotors({setup, design}) {
+  const told = design.arm?.reflected_inertia, left = setup.robot.keys.torque_loop_inertia_ratio;
+  const acts = told ? told.map((x, i) => (left ? rounded(x * left[i], 7) : x)) : setup.model.reflected_inertia;
+  return acts.some(Boolean) ? acts : null;
+}
+
+export function configuration(of) {
+  const {setup, q, design, answer} = of, {stiffness, damping} = answer.gains, {config, urdf, base, tip} = setup.robot;
+  const pair = (told, K, C) => ({stiffness: compact(K), ...(told.ratio ? {damping_ratio: told.ratio} : {damping: compact(C)})});
+  const gains = design.mode === 'joint' ? {joint: pair(design.joint_damping, design.joint_stiffness, damping)} : {
+    task: {...pair(design.damping, stiffness, damping), frame: design.frame || 'base'},
+    null_space: pair(design.null_damping, design.null_stiffness, nullDamping(design))};
+  const loaded = config ? setup.designs[0] : {}, usually = (key, usual) => loaded[key] === undefined || loaded[key] === usual;
+  const unusual = (key, usual, name = key) => (design[key] === usual && usually(key, usual) ? {} : {[name]: design[key]});
+  const sampled = {...unusual('delay', 0), ...unusual('cutoff', 0), ...unusual('difference_velocity', false)};
+  const sections = {robot: {urdf, base, tip, ...armKeys(of)}, control: {period: design.period, mode: design.mode}, gains,
+    limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
+    analysis: Object.keys(sampled).length ? {sampled} : {}};
+  const refused = answer.refused.map(({key, reason}) =>
+    (key === 'q' ? `Here ${reason}.` : `The controller refuses it: ${key}: ${reason}.`));
+  const lines = Object.entries(sections).map(([key, value]) => [key, Object.entries(value)])
+    .filter(([, inner]) => inner.length)
+    .map(([key, inner]) => `${key}:\n${inner.map(([name, value]) => `  ${name}: ${json(value)}\n`).join('')}`);
+  return notes([config && `These keys take the place of those of ${config}, which keeps its others.`, `q: ${json(q)}`,
+    ...refused]) + lines.join('');
+}
+
+/// Matrices for `dashpot analyze`, a row a line.
+export const matrices = ({answer}) => `${json(answer.system, null, 1)
+  .replace(/\[\s+([^[\]]*?)\s+\]/g, (_, inner) => `[${inner.replace(/\s+/g, ' ')}]`)}\n`;
+
+/// A word for a shell.
+const quoted = (word) => (/^[\w./:,=@%+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
+
+/// Options of the programs that tell the arm.
+function armOptions(of) {
+  const {setup} = of, {urdf, base, tip} = setup.robot, keys = armKeys(of), {mass, center, inertia: I} = keys.payload || {};
+  const list = (name, values) => values && `--${name} ${values.join(',')}`;
+  const accepted = keys.accept_inertias;
+  return [`--urdf ${quoted(urdf)} --base ${quoted(base)} --tip ${quoted(tip)}`,
+    list('reflected-inertia', rotors(of)),
+    list('viscous-friction', keys.viscous_friction || setup.model.viscous_friction),
+    list('gear-stiffness', keys.gear_stiffness), list('gear-damping', keys.gear_damping),
+    keys.gear_stiffness && keys.position_sensor === 'link' && '--position-sensor link',
+    mass > 0 && list('payload',
+      [mass, ...(center || [0, 0, 0]), ...(I ? [...diagonal(I), I[0][1], I[0][2], I[1][2]] : [])]),
+    accepted && (accepted === true ? '--accept-inertias' : quoted(`--accept-inertias=${accepted.join(',')}`))];
+}
+
+/// Options of the gains, whose damping is a factor or a diagonal.
+function gainOptions(design, stiffness, damping) {
+  const prefix = design.mode === 'joint' ? 'joint-' : '', null_damping = nullDamping(design);
+  return [`--${prefix}stiffness ${diagonal(stiffness).join(',')}`,
+    damping.factor !== undefined ? `--damping-factor ${damping.factor}` : `--${prefix}damping ${diagonal(damping).join(',')}`,
+    ...(prefix ? [] : [
+      design.null_stiffness.some(Boolean) && `--null-stiffness ${design.null_stiffness.join(',')}`,
+      null_damping.some(Boolean) && `--null-damping ${null_damping.join(',')}`,
+      design.null_projector === 'kinematic' && '--null-projector kinematic',
+      design.rotation === 'half-quaternion' && '--rotation half-quaternion',
+      design.frame === 'tool' && '--frame tool'])];
+}
+
+export function command(of) {
+  const {setup, q, design} = of, {period, delay, cutoff, integral_time: integral} = design, {config, keys} = setup.robot;
+  const [stiffness, damping] = design.mode === 'joint' ? [design.joint_stiffness, design.joint_damping]
+    : [design.stiffness, design.damping];
+  const diagonals = isDiagonal(stiffness) && (damping.factor !== undefined || (Array.isArray(damping) && isDiagonal(damping)));
+  if (!diagonals || design.null_damping?.ratio || design.inertia_blocks) {
+    return notes(['The damping is a matrix: save "matrices for dashpot analyze" as system.json.']) +
+      'dashpot analyze system.json\n';
+  }
+  const without = ['tool', 'include_off_chain'].filter((key) => keys[key] !== undefined);
+  const loop = period > 0 ? [`--period ${period}`, delay && `--delay ${delay}`, cutoff && `--cutoff ${cutoff}`,
+    design.difference_velocity && '--difference-velocity', integral && `--integral-time ${integral}`] : [];
+  const words = ['dashpot audit', ...armOptions(of), `--q ${q.join(',')}`, ...gainOptions(design, stiffness, damping), ...loop];
+  return notes([config && `The arm as ${config} has it.`,
+    without.length && `There is no option for its ${without.join(' and ')}: ${kDiffers}`]) +
+    `${words.filter(Boolean).join(' \\\n    ')}\n`;
+}
+
+/// The 4 x 4 matrix of a frame.
+function poseRows({position: [x, y, z], rpy}) {
+  const [[cr, sr], [cp, sp], [cy, sy]] = rpy.map((angle) => [Math.cos(angle), Math.sin(angle)]);
+  return [[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x],
+    [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y], [-sp, cp * sr, cp * cr, z], [0, 0, 0, 1]];
+}
+
+/// Arguments of Robot.from_urdf.
+function robotArguments(of) {
+  const {urdf, base, tip} = of.setup.robot, keys = {...armKeys(of), reflected_inertia: rotors(of)}, {payload} = keys;
+  const named = ['gravity', 'accept_inertias', 'reflected_inertia', 'viscous_friction', 'coulomb_friction', 'gear_damping',
+    'position_sensor'].filter((key) => keys[key]).map((key) => `${key}=${keys[key] === true ? 'True' : json(keys[key])}`);
+  const gears = keys.gear_stiffness?.map((k) => (k === 'none' ? 'float("inf")' : k)).join(', ');
+  const carried = payload && payload.mass > 0 ? [`payload_mass=${payload.mass}`,
+    `payload_center=${json(payload.center || [0, 0, 0])}`, payload.inertia && `payload_inertia=${json(payload.inertia)}`] : [];
+  return [...[urdf, base, tip].map((word) => json(word)), ...named,
+    keys.include_off_chain === false && 'include_off_chain=False', gears && `gear_stiffness=[${gears}]`, ...carried,
+    keys.tool && `tool=${json(poseRows(keys.tool))}`].filter(Boolean).join(', ');
+}
+
+export function python(of) {
+  const {q, design, answer} = of, {stiffness, damping} = answer.gains, joint = design.mode === 'joint';
+  const prefix = joint ? 'joint' : 'task', told = joint ? design.joint_damping : design.damping, rest = design.null_damping;
+  const gains = [`${prefix}_stiffness=${json(compact(joint ? design.joint_stiffness : stiffness))}`,
+    told.ratio ? `${prefix}_damping_ratio=${told.ratio}` : `${prefix}_damping=${json(compact(damping))}`,
+    ...(joint ? [] : [`null_stiffness=${json(design.null_stiffness)}`,
+      rest.ratio ? `null_damping_ratio=${rest.ratio}` : `null_damping=${json(nullDamping(design))}`,
+      `frame="${design.frame || 'base'}"`])];
+  return notes([
+    design.null_projector === 'kinematic' && design.null_stiffness.some(Boolean) &&
+      `Here the null space has the dynamically consistent projector: ${kDiffers}`,
+    answer.damping_level && answer.damping_level.share < 1 &&
+      `The sampled loop leaves less of the ratio, which this call does not count: ${kDiffers}`,
+    ...answer.refused.map(({key, reason}) => `refused: ${key}: ${reason}`)]) +
+    `import dashpot\n\nrobot = dashpot.Robot.from_urdf(${robotArguments(of)})\n` +
+    `modes = dashpot.closed_loop(robot, ${json(q)},\n    ${gains.join(',\n    ')}).modes\nprint(modes)\n`;
+}

@@ -1,0 +1,32 @@
+// Questions to the program, of which the newest counts.
+
+/// Returns the answer, or {error}.
+export async function post(token, path, body) {
+  try {
+    const headers = {'Content-Type': 'application/json', 'X-Dashpot-Token': token};
+    return await (await fetch(path, {method: 'POST', body, headers})).json();
+  } catch {
+    return {error: 'the program does not answer; is it still running?', gone: true};
+  }
+}
+
+/// Asks at a path, one question at a time: while one is under way the newest of the others waits. `heard` is called
+/// with each answer and what was asked.
+export class Newest {
+  constructor(token, path, heard) { Object.assign(this, {token, path, heard, busy: false, next: null, last: ''}); }
+  ask(question) {
+    const body = JSON.stringify(question);
+    if (body === this.last) return;
+    this.last = this.next = body;
+    if (!this.busy) this.run();
+  }
+  async run() {
+    this.busy = true;
+    while (this.next) {
+      const body = this.next;
+      this.next = null;
+      this.heard(await post(this.token, this.path, body), JSON.parse(body));  // what was asked may have changed since
+    }
+    this.busy = false;
+  }
+}

@@ -1,0 +1,100 @@
+// What the page of `dashpot tune` is about: the state that is edited, and what the program says of both designs.
+import {$, keepErrors} from '../shared/dom.js';
+import {rounded} from '../shared/numbers.js';
+import {kDesigns} from './designs.js';
+import {Newest, post} from './requests.js';
+import {Store} from './store.js';
+import {Workspace} from './workspace.js';
+
+const kTogether = 15;  // ms that the answer of one design waits for that of the other, to be drawn in one frame
+
+export class Tuning {
+  errors = []; timing = []; poles = [];
+  answers = {a: null, b: null};
+  asked = {a: null, b: null};       // what the answers are of
+  problem = {a: '', b: ''};         // why there is no newer answer
+  old = {a: false, b: false};       // whether the answers are of other designs
+  chosen = null;                    // number of the mode whose shape is shown
+  current = false; moved = 0;       // whether all that is shown is of the state; when it changed, ms
+  later = 0;
+
+  /// `changed` is called when the state has changed, `redraw` with the names of parts to be drawn again.
+  constructor(setup, changed, redraw) {
+    keepErrors(this.errors);
+    Object.assign(this, {setup, redraw});
+    this.store = new Store({q: setup.q, place: 'tip/0', motion: 'step', edited: 'a', a: setup.designs[0], b: setup.designs[1]},
+      (ended) => {
+        this.current = false;
+        this.moved = this.workspace.moved = performance.now();
+        changed(ended);
+        this.ask();
+      });
+    this.workspace = new Workspace(setup.token, () => redraw('workspace'));
+    this.questions = Object.fromEntries(kDesigns.map((name) =>
+      [name, new Newest(setup.token, '/design', (heard, asked) => this.hear(name, heard, asked))]));
+  }
+
+  get state() { return this.store.state; }
+  design(name = this.state.edited) { return this.state[name]; }
+  answer(name = this.state.edited) { return this.answers[name]; }
+  other() { return this.state.edited === 'a' ? 'b' : 'a'; }
+  edit(change, ended) { this.store.edit(change, ended); }
+  unitOf(joint) { return this.setup.arm.joints[joint]?.prismatic ? 'm' : 'rad'; }
+  wantedRatio() { return this.design().damping.ratio || this.design().joint_damping.ratio || 0.7; }
+  /// The matrix of damping that acts, or null where the answer is of other springs.
+  actingDamping() {
+    return this.answer() && this.asked[this.state.edited].design.mode === this.design().mode ? this.answer().gains.damping : null;
+  }
+  choose(label) {
+    this.chosen = this.chosen === label ? null : label;
+    this.redraw('arm', 'poles', 'texts');
+  }
+
+  ask() {
+    const {q, place} = this.state;
+    for (const name of kDesigns) this.questions[name].ask({q, place, design: this.design(name)});
+  }
+  hear(name, heard, asked) {
+    this.problem[name] = heard.error || '';
+    this.old[name] = !!heard.error;
+    if (!heard.error) this.answers[name] = heard;
+    this.asked[name] = asked;
+    $('link').textContent = heard.gone ? heard.error : '';
+    $('link').className = 'badge bad';
+    clearTimeout(this.later);
+    const waits = kDesigns.some((one) => one !== name && this.questions[one].busy);
+    this.later = setTimeout(() => this.redraw('arm', 'poles', 'motion', 'texts'), waits ? kTogether : 0);
+    const {a, b} = this.state, all = Object.values(this.questions);
+    if (all.every((question) => !question.busy || !question.next)) this.workspace.look({a, b});
+  }
+  /// Notes whether all that is shown is of the state, and how long that took.
+  noteDrawn() {
+    const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+    this.current = kDesigns.every((name) => this.asked[name] && same(this.asked[name].design, this.design(name)) &&
+      same(this.asked[name].q, this.state.q));
+    if (!this.current || !this.moved) return;
+    this.timing.push(performance.now() - this.moved);
+    this.moved = 0;
+  }
+
+  /// Takes the damping of the wanted ratio at this posture: the matrix for all modes, or a diagonal whose smallest ratio
+  /// it is.
+  async propose(key, full) {
+    const {edited: name, q, place} = this.state, ratio = this.wantedRatio();
+    const ask = (damping) =>
+      post(this.setup.token, '/design', JSON.stringify({q, place, design: {...this.design(name), [key]: damping}}));
+    let found = await ask({ratio});
+    const singular = found.error ? '' : found.refused.find((refused) => refused.key === 'q')?.reason || '';
+    let damping = found.error || singular ? null : found.gains.damping;
+    for (let turn = 0; damping && !full && turn < 8; ++turn) {
+      const diagonal = damping.map((x, i) => (turn ? x * ratio / found.smallest_ratio : x[i]));
+      found = await ask(diagonal);
+      damping = found.error || !(found.smallest_ratio > 0) ? null : diagonal;
+      if (damping && Math.abs(found.smallest_ratio - ratio) < 1e-3) break;
+    }
+    this.problem[name] = damping ? '' : singular || found.error || 'damping: no diagonal gives the ratio';
+    const round = (x) => rounded(x, 6);
+    if (damping) this.edit((state) => { state[name][key] = damping.map((x) => (full ? x.map(round) : round(x))); }, true);
+    else this.redraw('texts');
+  }
+}
