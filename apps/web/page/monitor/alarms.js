@@ -5,18 +5,19 @@ import {wantedRatio} from './loop_state.js';
 import {judge} from './tables.js';
 
 const kNone = '–';
+const goal = (wanted) => (wanted > 0 ? `; wanted ${number(wanted, 3)}` : '');
 const count = (n) => [String(n), n ? 'bad' : 'good'];
 
 /// Cards {name, value, kind}.
 function cards(page) {
   const {frame: {state, sampled, alarms}, setup} = page, wanted = wantedRatio(page), margin = setup.gain_margin || 1;
   const since = !alarms.changes_of_ratio ? 'so far' : wanted > 0 ? 'since it is wanted' : 'since none is wanted';
-  const {smallest_ratio: ratio, smallest_margin: least} = alarms, unlimited = sampled ? ['∞', 'good'] : [kNone, 'none'];
-  const fault = state && state.fault;
+  const {smallest_ratio: ratio, smallest_margin: least} = alarms, fault = state && state.fault;
   return [
-    [`smallest ratio ${since}${wanted > 0 ? `; wanted ${number(wanted, 3)}` : ''}`, number(ratio, 3), judge(ratio, wanted)],
-    [`smallest gain margin${setup.gain_margin ? `; wanted ${number(margin, 3)}` : ''}`,
-      ...(least === null ? unlimited : [`${number(least, 3)} ×`, least < 0.999 * margin ? 'bad' : 'good'])],
+    [`smallest ratio ${since}${goal(wanted)}`, number(ratio, 3), judge(ratio, wanted)],
+    [`smallest gain margin${goal(setup.gain_margin)}`,
+      ...(least !== null ? [`${number(least, 3)} ×`, least < 0.999 * margin ? 'bad' : 'good']
+        : sampled ? ['∞', 'good'] : [kNone, 'none'])],
     ['messages with a bound lost', ...count(alarms.bounds_lost)],
     ['messages without modes', ...count(alarms.modes_lost)],
     ['latched fault', fault ? state.fault_text.split(',')[0] : alarms.faults ? `${alarms.faults} before` : 'none',
@@ -52,13 +53,14 @@ export function copyWorstPosture(page) {
   }});
 }
 
-export function fillLoopNumbers({frame: {state}}, rate) {
+export function fillLoopNumbers(page, rate) {
+  const {state} = page.frame;
   if (!state) {
     fillPairs('loop', [['loop', 'no state yet']]);
     return;
   }
   const [x, y, z, ...turn] = state.tip_error, joint = state.mode === 0, level = state.damping_level;
-  const ratio = joint ? state.joint_damping_ratio : state.task_damping_ratio, force = Math.hypot(...state.tip_wrench.slice(0, 3));
+  const ratio = wantedRatio(page), force = Math.hypot(...state.tip_wrench.slice(0, 3));
   fillPairs('loop', [
     ['tick', `${number(state.tick_time * 1e-3, 2)} µs, longest ${number(state.longest_tick_time * 1e-3, 3)} µs` +
       `${rate ? `; ${Math.round(rate)} in a second` : ''}`],

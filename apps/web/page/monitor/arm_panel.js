@@ -9,14 +9,15 @@ const value = (id) => Number($(id).value);
 
 /// The label and text of each mode and zero mode whose shape can be shown.
 export function shapes({frame: {modes}, response}) {
-  const zero = (response ? response.zero_modes : []).map((_, i) => ({label: `${kZero}${i + 1}`, text: `${kZero}${i + 1}`}));
-  return [...(modes ? modes.label : []).map((label) => ({label, text: `mode ${label}`})), ...zero];
+  const zero = (response ? response.zero_modes : []).map((_, i) => `${kZero}${i + 1}`);
+  return [...(modes ? modes.label : []).map((label) => ({label, text: `mode ${label}`})),
+    ...zero.map((label) => ({label, text: label}))];
 }
 
 /// The shape of the chosen mode just now, as ArmView takes it, with its frequency; or null.
 function swing({chosen, frame: {modes}, response}) {
   if (chosen === null) return null;
-  const phase = reducedMotion() ? 0 : 2 * Math.PI * value('pace') * performance.now() * 1e-3;  // at rest: how far it goes
+  const phase = 2 * Math.PI * value('pace') * (reducedMotion() ? 0 : performance.now() * 1e-3);
   const swinging = {label: chosen, phase, amplitude: value('amplitude')};
   if (typeof chosen === 'string') {
     const row = response && response.zero_modes[Number(chosen.slice(kZero.length)) - 1];

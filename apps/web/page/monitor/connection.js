@@ -7,7 +7,8 @@ export async function get(path) {
   return body;
 }
 
-/// Calls linked(whether, in words), begin(setup) when the program is reached, history(curves) of a log, and take(frame).
+/// Calls `heard`: linked(whether, in words), begin(setup) when the program is reached, history(curves) of a log, and
+/// take(frame).
 export class Connection {
   constructor(heard) { Object.assign(this, {heard, connected: false, replay: new Replay()}); }
 
@@ -16,22 +17,23 @@ export class Connection {
     this.heard.linked(connected, said);
   }
   async open() {
-    let setup = null;
-    while (!setup) {
-      setup = await get('/setup').catch(() => null);
-      if (setup) break;
-      this.link(false, 'no connection; trying again');
-      await new Promise((done) => setTimeout(done, 1000));
-    }
-    this.heard.begin(setup);
-    if (setup.live) {
-      this.stream();
+    const setup = await get('/setup').catch(() => null);
+    if (!setup) {
+      this.lose('no connection');
       return;
     }
-    const said = setup.damage ? `log: ${setup.damage}` : 'log';
+    this.heard.begin(setup);
+    if (setup.live) this.stream();
+    else await this.replayLog(setup.duration, setup.damage ? `log: ${setup.damage}` : 'log');
+  }
+  lose(said) {
+    this.link(false, `${said}; trying again`);
+    setTimeout(() => this.open(), 1000);  // the server may have come back with another arm
+  }
+  async replayLog(duration, said) {
     this.link(true, said);
     this.heard.history(await get('/history'));
-    this.replay.run(setup.duration, async (time) => {
+    this.replay.run(duration, async (time) => {
       const frame = await get(`/frame?t=${time.toFixed(6)}`).catch(() => null);
       if (frame && !this.connected) this.link(true, said);
       if (frame) this.heard.take(frame);
@@ -47,9 +49,8 @@ export class Connection {
       this.heard.take(JSON.parse(e.data));
     };
     events.onerror = () => {
-      this.link(false, 'connection lost; trying again');
       events.close();
-      setTimeout(() => this.open(), 1000);  // the server may have come back with another arm
+      this.lose('connection lost');
     };
   }
 }

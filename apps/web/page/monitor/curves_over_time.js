@@ -1,5 +1,5 @@
 // Curves of modes and ticks over time: the last minute of a loop, or a whole log.
-import {fill, element, listen} from '../shared/dom.js';
+import {element, fill} from '../shared/dom.js';
 import {markElement} from '../shared/mode_marks.js';
 import {number, tickText} from '../shared/numbers.js';
 import {isGap, timeOf, wantedRatio} from './loop_state.js';
@@ -35,11 +35,6 @@ export class History {
     }
   }
   copy() { return new History(...structuredClone([this.time, this.tick, this.status, this.mode])); }
-}
-
-/// Lets buttons zoom the curves, which share their View.
-export function zoomButtons(plot) {
-  listen('click', {zoom_in: () => plot.zoom(2), zoom_out: () => plot.zoom(1 / 2), zoom_all: () => plot.all()});
 }
 
 /// Draws `history` on the plots for frequencies, ratios and ticks, with the legends.

@@ -54,7 +54,8 @@ export function identifiedPoles({identified}) {
 export function otherJoints({setup: {arm}, frame: {state, modes}}) {
   const n = (state || modes || {n: 0}).n;
   if (!n || !arm || n === arm.joints.length) return '';
-  return `other joints: the loop has ${n}, ${arm.name} has ${arm.joints.length}.\nStart with the --config of this loop.`;
+  const own = `${arm.name} has ${arm.joints.length}`;
+  return `other joints: the loop has ${n}, ${own}.\nStart with the --config of this loop.`;
 }
 
 /// Whether the modes that the loop has are those of the configuration's gains.

@@ -9,8 +9,9 @@ import {followTheme} from '../shared/theme.js';
 import {copyWorstPosture, fillAlarms, fillLoopNumbers, fillSampledNumbers} from './alarms.js';
 import {drawArm, shapes, showArmTexts} from './arm_panel.js';
 import {Connection} from './connection.js';
-import {History, drawCurves, zoomButtons} from './curves_over_time.js';
-import {TickRate, identifiedPoles, loopState, polesOf, posture, springForce, timeOf, wantedRatio} from './loop_state.js';
+import {History, drawCurves} from './curves_over_time.js';
+import {TickRate, identifiedPoles, loopState, polesOf, posture, springForce, timeOf,
+  wantedRatio} from './loop_state.js';
 import {showLink, showLoopState} from './notices.js';
 import {ResponsePanel} from './response_panel.js';
 import {drawCircle, sampledPoles} from './sampled_circle.js';
@@ -35,9 +36,9 @@ class Page {
   constructor() {
     keepErrors(this.errors);
     const {times} = this, omegas = new View(), soon = (part) => () => this.redraw.soon(part);
-    this.redraw = new Redraw({arm: () => this.drawArm(), poles: () => this.drawPoles(), numbers: () => this.showNumbers(),
-      curves: () => drawCurves(this, this.plots, this.held || this.history, this.ticks.period(this)),
-      response: () => this.panel.draw()}, {every: kEvery, rate: kRate, ready: () => this.setup && this.frame});
+    this.redraw = new Redraw({arm: () => this.drawArm(), poles: () => this.drawPoles(), curves: () => this.drawCurves(),
+      response: () => this.panel.draw(), numbers: () => this.showNumbers(),
+    }, {every: kEvery, rate: kRate, ready: () => this.setup && this.frame});
     this.view = new ArmView($('arm'), soon('arm'));
     this.map = new PoleMap($('poles'), soon('poles'), (label) => this.choose(label));
     const plot = (id, part, view) => new Plot($(id), soon(part), view);
@@ -46,9 +47,9 @@ class Page {
       phase: plot('phase', 'response', omegas)};
     this.panel = new ResponsePanel(this, this.plots, () => this.redraw.soon('response', 'numbers'));
     this.connection = new Connection({take: (frame) => this.take(frame), begin: (setup) => this.begin(setup),
-      linked: (connected, said) => this.linked(connected, said),
-      history: ({time, tick_time: tick, status, mode}) => {
-        this.forget(new History(time, tick, status, new Map(Object.entries(mode).map(([label, of]) => [Number(label), of]))));
+      linked: (connected, said) => this.linked(connected, said), history: ({time, tick_time: tick, status, mode}) => {
+        const modes = Object.entries(mode).map(([label, curves]) => [Number(label), curves]);
+        this.forget(new History(time, tick, status, new Map(modes)));
       }});
     this.replay = this.connection.replay;
     followTheme($('theme'), () => this.redraw.soon());
@@ -56,11 +57,15 @@ class Page {
     setInterval(() => {  // ages grow by themselves, trails end
       if (this.setup?.live && this.frame) this.redraw.later('numbers', 'poles');
     }, 2000);
-    zoomButtons(this.plots.frequency);
     copyWorstPosture(this);
     const swing = () => this.redraw.soon('arm', 'numbers');
     listen('input', {amplitude: swing, pace: swing});
-    listen('click', {pause: () => this.pause(!this.paused)});
+    const zoom = (factor) => () => {
+      if (factor) this.plots.frequency.zoom(factor);
+      else times.shown = null;
+      this.redraw.soon('curves');
+    };
+    listen('click', {zoom_in: zoom(2), zoom_out: zoom(.5), zoom_all: zoom(0), pause: () => this.pause(!this.paused)});
     this.connection.open();
   }
 
@@ -138,6 +143,9 @@ class Page {
     $('circle').hidden = !sampled;
     if (sampled) drawCircle($('circle'), sampledPoles(sampled, period));
     fillSampledNumbers(this, period);
+  }
+  drawCurves() {
+    drawCurves(this, this.plots, this.held || this.history, this.ticks.period(this));
   }
   showNumbers() {
     this.ticks.note(this.frame.state);

@@ -8,11 +8,9 @@ const kOldModes = 5;   // s that modes may lag behind the state
 // By the text of the fault before its comma, as controller::to_text has it.
 const kFaults = {
   'springs restarted too often':
-    'Set-points or commands let the springs start again and again. Send set-points at a steady pace, and release ' +
-    'once.',
+    'Set-points or commands let the springs start again and again. Send set-points at a steady pace; release once.',
   'gap between states':
-    'The host lost states or ticks. Look for other load on its computer, and whether its thread has real-time ' +
-    'priority.',
+    'The host lost states or ticks. Look for other load on its computer, and whether it has real-time priority.',
   'loop at the wrong rate': 'The host calls the loop at another rate than control.period says. Make both agree.',
   collision:
     'Free the arm, look for the cause, then release. If nothing was touched, the model lacks friction or a payload: ' +
@@ -37,11 +35,9 @@ const kFaults = {
     "Engage the robot's brakes now. Check signs and units of torques, and the model's masses, before you release.",
   'state not finite': 'The host passes on a number that is none. Check the driver and filters of the velocity.',
   'state of wrong size':
-    'The host passes on another number of joints than the model has. Check base and tip of robot in the ' +
-    'configuration.',
+    'The host passes on another number of joints than the model has. Check base and tip in the configuration.',
   'state jumped':
-    'A position leapt farther than the robot can move: an encoder slipped or wrapped, or states were lost. Compare it ' +
-    'with the arm.',
+    'A position leapt farther than the robot moves: an encoder slipped or wrapped, or states were lost. Look at it.',
   'torque not finite': 'Gains or set-points gave a number that is none. Report it with the log and the configuration.',
 };
 export const faultAdvice = (text) => Object.entries(kFaults).find(([begin]) => text.startsWith(begin))?.[1] ||

@@ -46,10 +46,10 @@ export class Replay {
     let then = performance.now(), shown = null;
     for (;;) {
       await new Promise((done) => setTimeout(done, 66));
-      const now = performance.now(), wanted = this.playing ? this.time + 1e-3 * (now - then) * kSpeeds[this.speed] : this.time;
-      then = now;
-      this.time = Math.min(wanted, end);
+      const now = performance.now();
+      if (this.playing) this.time = Math.min(this.time + 1e-3 * (now - then) * kSpeeds[this.speed], end);
       if (this.playing && this.time >= end) this.setPlaying(false);
+      then = now;
       const asked = this.time;
       if (asked === shown) continue;
       shown = await frameAt(asked) ? asked : null;

@@ -39,8 +39,8 @@ export function drawCircle(canvas, poles) {
   c.clip();
   c.fillStyle = colour('grid');
   const most = Math.min(Math.PI, 1.3 * (h / 2) / k);  // the circle is larger than the canvas, mostly
-  const arc = Array.from({length: 129}, (_, i) => (i - 64) / 64 * most).map((a) => [toX(Math.cos(a)), toY(Math.sin(a))]);
-  trace(c, [...arc, [-4, -40], [-4, h + 40]], true);
+  const angles = Array.from({length: 129}, (_, i) => (i - 64) / 64 * most);
+  trace(c, [...angles.map((a) => [toX(Math.cos(a)), toY(Math.sin(a))]), [-4, -40], [-4, h + 40]], true);
   c.globalAlpha = 0.6;
   c.fill();
   c.globalAlpha = 1;

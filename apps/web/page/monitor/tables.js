@@ -45,9 +45,10 @@ function resize(table, rows, cells) {
 }
 
 export function fillModeTable(page) {
-  const {frame: {modes}, setup: {arm}, chosen} = page, wanted = wantedRatio(page), count = modes ? modes.label.length : 0;
-  setText('modes_note', !modes ? 'none yet' : `${count}, and ${modes.zero_modes} zero; ${kOrigins[modes.origin] || ''}` +
-    `${modes.status ? `; ${modes.status_text}` : ''}; ` +
+  const {frame: {modes}, setup: {arm}, chosen} = page, wanted = wantedRatio(page);
+  const count = modes ? modes.label.length : 0, status = modes && modes.status ? `${modes.status_text}; ` : '';
+  setText('modes_note', !modes ? 'none yet' : `${count}, and ${modes.zero_modes} zero; ` +
+    `${kOrigins[modes.origin] || ''}; ${status}` +
     `${wanted > 0 ? `wanted ratio ${number(wanted, 3)}` : 'no ratio is wanted'}`);
   const names = arm ? arm.joints.map((joint, i) => `q${i + 1} = ${joint.name}`).join('\n') : '';
   resize($('rows'), count, 7).forEach((cells, i) => {

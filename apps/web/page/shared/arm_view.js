@@ -12,24 +12,16 @@ const kFrameColours = ['#d55e00', '#009e73', '#0072b2'];
 /// `changed` is called when the arm has to be drawn again because of pointer or keys.
 export class ArmView {
   constructor(canvas, changed = () => {}) {
-    Object.assign(this, {canvas, changed, turn: 0.75, tilt: 0.32, zoom: 1, reach: 0});
-    listenToGestures(canvas, {
+    Object.assign(this, {canvas, turn: 0.75, tilt: 0.32, zoom: 1, reach: 0});
+    listenToGestures(canvas, changed, {
       drag: (dx, dy) => this.orbit(dx * 0.01, dy * 0.01),
-      zoom: (factor) => this.scale(factor),
-      arrow: (right, down) => {
-        this.orbit(right * 0.1, down * 0.1);
-        return true;
-      },
+      zoom: (factor) => { this.zoom = Math.min(6, Math.max(0.3, this.zoom * factor)); },
+      arrow: (right, down) => this.orbit(right * 0.1, down * 0.1),
     }, {step: 1.1, wheel: 0.001, greedy: true});
   }
   orbit(turn, tilt) {
     this.turn -= turn;
     this.tilt = Math.min(1.5, Math.max(-0.2, this.tilt + tilt));
-    this.changed();
-  }
-  scale(factor) {
-    this.zoom = Math.min(6, Math.max(0.3, this.zoom * factor));
-    this.changed();
   }
 
   /// `arm` is the chain of /setup, q a posture, `shape` {label, re, im, phase, amplitude} or null. `scene` may have
@@ -80,7 +72,8 @@ export class ArmView {
     const distance = dot(normal, along(tip, -1, point)), half = 0.35 * this.reach;
     if (!(Math.abs(distance) < this.reach)) return '';
     const foot = along(tip, -distance, normal), [u, v] = perpendiculars(normal);
-    trace(c, [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) => project(along(along(foot, half * a, u), half * b, v))), true);
+    const corner = ([a, b]) => project(along(along(foot, half * a, u), half * b, v));
+    trace(c, [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(corner), true);
     c.globalAlpha = 0.18;
     c.strokeStyle = c.fillStyle = colour(distance < 0 && stiffness === null ? 'bad' : 'accent');
     c.fill();
@@ -101,9 +94,9 @@ export class ArmView {
 
   /// A force at the tip as an arrow, whose length grows with its logarithm from 1 N on.
   arrow(c, project, at, force, name, style = 'force') {
-    const size = Math.hypot(...force);
+    const size = Math.hypot(...force), length = 0.12 * this.reach * Math.log10(10 * size);
     if (!(size >= 1)) return;
-    const [ax, ay] = project(at), [bx, by] = project(along(at, 0.12 * this.reach * Math.log10(10 * size) / size, force));
+    const [ax, ay] = project(at), [bx, by] = project(along(at, length / size, force));
     c.strokeStyle = c.fillStyle = colour(style);
     c.lineWidth = 3;
     line(c, ax, ay, bx, by);

@@ -57,8 +57,8 @@ export function showHint(canvas, x, y, rows) {
   if (!rows) return;
   hint.replaceChildren(...rows.map(({label, text}) =>
     element('div', {}, ...(label === undefined ? [] : [markElement(label), ' ']), text)));
-  const box = canvas.getBoundingClientRect(), wide = hint.offsetWidth, room = window.innerHeight - hint.offsetHeight - 4;
+  const box = canvas.getBoundingClientRect(), {offsetWidth: wide, offsetHeight: high} = hint;
   const left = box.left + x + 14, over = left + wide > document.documentElement.clientWidth - 4;
   hint.style.left = `${window.scrollX + (over ? Math.max(4, left - 28 - wide) : left)}px`;
-  hint.style.top = `${window.scrollY + Math.max(4, Math.min(box.top + y - 10, room))}px`;
+  hint.style.top = `${window.scrollY + Math.max(4, Math.min(box.top + y - 10, window.innerHeight - high - 4))}px`;
 }

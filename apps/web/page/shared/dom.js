@@ -2,8 +2,7 @@
 
 export const $ = (id) => document.getElementById(id);
 
-/// Makes an element. An attribute that is a function listens to the event of its name; one that is undefined is left
-/// out.
+/// Makes an element. An attribute that is a function listens to the event of its name; undefined is left out.
 export function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [key, value] of Object.entries(attributes)) {
@@ -13,6 +12,9 @@ export function element(tag, attributes = {}, ...children) {
   made.append(...children);
   return made;
 }
+
+export const button = (click, attributes, ...children) =>
+  element('button', {type: 'button', click, ...attributes}, ...children);
 
 /// Listens to an event of the elements with some ids: {id: what it does}.
 export function listen(event, actions) {
@@ -32,7 +34,7 @@ export function fill(id, key, make) {
 
 /// Fills a list of names and values.
 export function fillPairs(id, items) {
-  fill(id, JSON.stringify(items), () => items.flatMap(([name, said]) => [element('dt', {}, name), element('dd', {}, said)]));
+  fill(id, JSON.stringify(items), () => items.flat().map((text, i) => element(i % 2 ? 'dd' : 'dt', {}, text)));
 }
 
 /// Keeps what goes wrong on the page.

@@ -3,7 +3,7 @@
 // Seven colours, which people with any kind of colour vision can tell apart (Okabe and Ito, and ink), and six marks: 42
 // labels in a row look different. The program numbers modes on by 32 when it has to begin again, and then the first one
 // looks like the first one. A label that is text, such as a zero mode's, has the colour of ink.
-import {$, element, fill} from './dom.js';
+import {$, button, element, fill} from './dom.js';
 import {colour} from './theme.js';
 
 const kMarks = ['M1 0A1 1 0 1 1-1 0A1 1 0 1 1 1 0Z', 'M-.87-.87H.87V.87H-.87Z', 'M0-1.2L1.1.75H-1.1Z',
@@ -32,27 +32,20 @@ export function drawMark(c, label, x, y, r, open = false) {
 
 /// Returns the mark of a mode as an element of the page, with its dash if it is for curves.
 export function markElement(label, dashed = false) {
-  const make = (name, attributes) => {
-    const part = document.createElementNS('http://www.w3.org/2000/svg', name);
-    for (const [key, value] of Object.entries(attributes)) part.setAttribute(key, value);
-    return part;
-  };
-  const svg = make('svg', {class: dashed ? 'mark wide' : 'mark', 'aria-hidden': 'true',
-    viewBox: dashed ? '-3 -1.4 6 2.8' : '-1.4 -1.4 2.8 2.8'});
-  svg.style.color = `var(--${colourName(label)})`;
-  if (dashed) {
-    svg.append(make('path', {d: 'M-3 0H3', stroke: 'currentColor', 'stroke-width': .3,
-      'stroke-dasharray': modeDash(label).map((x) => x / 8).join(' ')}));
-  }
-  svg.append(make('path', {d: kMarks[place(label) % 6], fill: 'currentColor'}));
-  return svg;
+  const dashes = modeDash(label).map((x) => x / 8).join(' '), box = dashed ? '-3 -1.4 6 2.8' : '-1.4 -1.4 2.8 2.8';
+  const mark = element('span', {});
+  mark.innerHTML = `<svg class="${dashed ? 'mark wide' : 'mark'}" aria-hidden="true" viewBox="${box}">` +
+    (dashed ? `<path d="M-3 0H3" stroke="currentColor" stroke-width=".3" stroke-dasharray="${dashes}"/>` : '') +
+    `<path d="${kMarks[place(label) % 6]}" fill="currentColor"/></svg>`;
+  mark.firstChild.style.color = `var(--${colourName(label)})`;
+  return mark.firstChild;
 }
 
 /// A button for each {label, text} of a mode or zero mode whose shape can be shown.
 export function fillChips(items, chosen, choose) {
   const focused = document.activeElement?.closest('#chips') ? document.activeElement.dataset.label : null;
   const fresh = fill('chips', JSON.stringify([items, chosen]), () => items.map(({label, text}) =>
-    element('button', {type: 'button', 'aria-pressed': label === chosen, 'data-label': label, click: () => choose(label)},
+    button(() => choose(label), {'aria-pressed': label === chosen, 'data-label': label},
       ...(typeof label === 'number' ? [markElement(label), ' '] : []), text)));
   if (fresh && focused) [...$('chips').children].find((chip) => chip.dataset.label === focused)?.focus();
 }

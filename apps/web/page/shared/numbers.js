@@ -6,7 +6,8 @@ function powerOfTen(x) {
   return `${digits === '1' ? '' : `${digits}·`}10${superscript(Number(power))}`;
 }
 const kForms = {
-  figures: (x, digits, far) => (far ? x.toExponential(1) : Math.abs(x) >= 10 ** digits ? Math.round(x) : x.toPrecision(digits)),
+  figures: (x, digits, far) =>
+    (far ? x.toExponential(1) : Math.abs(x) >= 10 ** digits ? Math.round(x) : x.toPrecision(digits)),
   decimals: (x, digits) => (+x.toFixed(digits) + 0).toFixed(digits),  // no sign before a zero
   tick: (x, digits, far) => (far ? powerOfTen(x) : rounded(x, digits)),
 };

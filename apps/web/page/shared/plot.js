@@ -21,70 +21,63 @@ const back = (log, v) => (log ? 10 ** v : v);
 /// shows all again. With Shift the arrow keys move the line whose values are shown.
 export class Plot {
   constructor(canvas, changed, view = new View()) {
-    Object.assign(this, {canvas, changed, view, drawn: null, pointer: null});
-    listenToGestures(canvas, {
+    Object.assign(this, {canvas, view, drawn: null, pointer: null});
+    listenToGestures(canvas, changed, {
       hover: (place) => {
         this.pointer = place;
-        this.view.at = this.value(place[0]);
-        this.changed();
+        view.at = this.value(place[0]);
       },
       drag: (dx) => this.move(-dx / this.width()),
       leave: () => {
-        this.pointer = this.view.at = null;
-        showHint(this.canvas, 0, 0, null);
-        this.changed();
+        this.pointer = view.at = null;
+        showHint(canvas, 0, 0, null);
       },
       zoom: (factor, place) => this.zoom(factor, place && this.value(place[0])),
-      all: () => this.all(),
-      arrow: (side, down, shift) => {
-        if (side && shift) this.step(side);
-        else if (side) this.move(0.1 * side);
-        return side !== 0;
-      },
+      all: () => { view.shown = null; },
+      arrow: (side, _, shift) => side !== 0 && (shift ? this.step(side) : this.move(0.1 * side)),
     }, {step: 1.5});
   }
   width() { return Math.max(1, this.canvas.clientWidth - kLeft - kRight); }
-  /// What is drawn of the horizontal axis, and all of it, as the axis counts: logarithms, if it has them.
+  /// What is shown of the horizontal axis, which has a range.
+  shown(range) {
+    const {shown} = this.view;
+    return shown && shown[0] < range[1] && shown[1] > range[0] ? shown : range;
+  }
+  /// What is shown of the horizontal axis, and all of it, as the axis counts: logarithms, if it has them.
   spans() {
-    const {log, range, whole} = this.drawn;
-    return {log, range: range.map((v) => forward(log, v)), whole: whole.map((v) => forward(log, v))};
+    const {log, range} = this.drawn, counted = (ends) => ends.map((v) => forward(log, v));
+    return {log, shown: counted(this.shown(range)), range: counted(range)};
   }
   /// The value of the horizontal axis at a pixel, or null.
   value(x) {
     if (!this.drawn) return null;
-    const {log, range: [a, b]} = this.spans();
+    const {log, shown: [a, b]} = this.spans();
     return back(log, a + (b - a) * Math.min(1, Math.max(0, (x - kLeft) / this.width())));
-  }
-  all() {
-    this.view.shown = null;
-    this.changed();
   }
   /// Enlarges by a factor, with the value `at` where it is.
   zoom(factor, at = this.view.at) {
     if (!this.drawn) return;
-    const {log, range: [a, b], whole: [low, high]} = this.spans(), most = high - low;
-    const fixed = at === null ? (a + b) / 2 : forward(log, at), share = Math.max(1 / factor, 1e-4 * most / (b - a));
-    this.show(fixed - (fixed - a) * share, fixed + (b - fixed) * share);
+    const {log, shown: [a, b], range: [low, high]} = this.spans();
+    const fixed = at === null ? (a + b) / 2 : forward(log, at), k = Math.max(1 / factor, 1e-4 * (high - low) / (b - a));
+    this.show(fixed - (fixed - a) * k, fixed + (b - fixed) * k);
   }
   move(share) {
     if (!this.drawn || !this.view.shown) return;
-    const {range: [a, b]} = this.spans(), by = share * (b - a);
+    const {shown: [a, b]} = this.spans(), by = share * (b - a);
     this.show(a + by, b + by);
   }
   /// Shows from a to b, moved to lie within the axis, or all of it.
   show(a, b) {
-    const {log, whole: [low, high]} = this.spans(), by = Math.max(0, low - a) - Math.max(0, b - high);
+    const {log, range: [low, high]} = this.spans(), by = Math.max(0, low - a) - Math.max(0, b - high);
     this.view.shown = b - a >= (high - low) * .999 ? null : [a + by, b + by].map((v) => back(log, v));
-    this.changed();
   }
   /// Moves the line whose values are shown.
   step(side) {
     if (!this.drawn) return;
-    const {log, range: [a, b]} = this.spans(), was = this.view.at === null ? (a + b) / 2 : forward(log, this.view.at);
+    const {log, shown: [a, b]} = this.spans(), was = this.view.at === null ? (a + b) / 2 : forward(log, this.view.at);
     const at = Math.min(b, Math.max(a, was + side * (b - a) / 100));
     this.view.at = back(log, at);
     this.pointer = [kLeft + this.width() * (at - a) / (b - a), kTop];
-    this.changed();
   }
 
   /// Draws `picture`:
@@ -95,8 +88,7 @@ export class Plot {
   ///   levels [{value, text}] across, `lines` [{value}] upright
   ///   cursor a value of x, or null; `strip` [{x, colour}] along the bottom
   draw(picture) {
-    const {c, w, h} = begin(this.canvas), {title, x} = picture, [from, to] = x.range, {shown} = this.view;
-    const range = shown && shown[0] < to && shown[1] > from ? shown : x.range;
+    const {c, w, h} = begin(this.canvas), {title, x} = picture, range = this.shown(x.range);
     const y = this.vertical(picture, range);
     if (!y || !(range[1] > range[0])) {
       const said = picture.empty || `${title}: nothing to show`;
@@ -105,7 +97,7 @@ export class Plot {
       say(c, w, h, said);
       return;
     }
-    this.drawn = {log: !!x.log, range, whole: x.range};
+    this.drawn = {log: !!x.log, range: x.range};
     const bottom = h - (x.bare ? 6 : kBottom);
     const map = (log, [a, b], low, high) => {
       const l = forward(log, a), k = (high - low) / (forward(log, b) - l);

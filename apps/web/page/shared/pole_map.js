@@ -11,20 +11,14 @@ const kRays = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// Eigenvalues with an imaginary part of 0 or above, at logarithmic distances from 0, which leave the rays of equal
 /// ratio straight.
 ///
-/// `changed` is called when the map has to be drawn again because of the pointer, `choose` with the label of a pole that
-/// is clicked. The wheel, after a click or with Ctrl, + and - zoom, dragging moves; a double click or 0 shows all again.
+/// `changed` is called when the map has to be drawn again because of the pointer, `choose` with the label of a pole
+/// that is clicked. The wheel, after a click or with Ctrl, + and - zoom, dragging moves; a double click or 0 shows all.
 export class PoleMap {
   constructor(canvas, changed = () => {}, choose = () => {}) {
-    Object.assign(this, {canvas, changed, trails: [], drawn: [], zoom: 1, shift: [0, 0], base: [0, 0], pointer: null});
-    listenToGestures(canvas, {
-      hover: (place) => {
-        this.pointer = place;
-        this.changed();
-      },
-      drag: (dx, dy) => {
-        if (this.zoom > 1) this.shift = [this.shift[0] + dx, this.shift[1] + dy];
-        this.changed();
-      },
+    Object.assign(this, {canvas, trails: [], drawn: [], zoom: 1, shift: [0, 0], base: [0, 0], pointer: null});
+    listenToGestures(canvas, changed, {
+      hover: (place) => { this.pointer = place; },
+      drag: (dx, dy) => { if (this.zoom > 1) this.shift = [this.shift[0] + dx, this.shift[1] + dy]; },
       click: (place) => {
         const pole = this.nearest(place);
         if (pole) choose(pole.label);
@@ -32,7 +26,6 @@ export class PoleMap {
       leave: () => {
         this.pointer = null;
         showHint(canvas, 0, 0, null);
-        this.changed();
       },
       zoom: (factor, place) => this.enlarge(factor, place),
       all: () => this.enlarge(0),
@@ -43,7 +36,6 @@ export class PoleMap {
     const from = at.map((x, i) => x - this.base[i]);
     this.shift = zoom === 1 ? [0, 0] : this.shift.map((s, i) => from[i] - k * (from[i] - s));
     this.zoom = zoom;
-    this.changed();
   }
   nearest([x, y]) {
     const upper = this.drawn.filter((p) => p.y <= this.origin[1] + 8);

@@ -18,6 +18,6 @@ export function drawResponses(magnitude, phase, responses, {title, note, frequen
     ({x: r.omega, y: values(r, i), colour: r.colour, name: r.name ?? name, unit: after, width: 2, dash: r.dash}));
   magnitude.draw({title: `${title}, ${unit}`, x: {...x, bare: true}, y: {log: true}, lines,
     curves: curves((r) => r.magnitude, '|H|', ` ${unit}`)});
-  phase.draw({title: 'phase, °; frequency, rad/s', x, lines, curves: curves((r, i) => turns[i], 'phase', '°'),
+  phase.draw({title: 'phase, °; frequency, rad/s', x, lines, curves: curves((_, i) => turns[i], 'phase', '°'),
     y: {degrees: true, range: [Math.min(...all, -180), Math.max(...all, 5)]}});
 }

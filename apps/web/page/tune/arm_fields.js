@@ -5,7 +5,7 @@ import {at, readNumbers, textInput} from './form_fields.js';
 
 /// Fields of the posture; the last writes all of it.
 export function postureFields(form, page) {
-  const {arm, postures, q} = page.setup, posture = () => page.store.state.q, setPosture = (to) => { page.store.state.q = to; };
+  const {arm, postures, q} = page.setup, posture = () => page.state.q, setPosture = (to) => { page.state.q = to; };
   const fields = arm.joints.map(({name, prismatic, lower, upper}, i) => {
     const [low, high] = isNumber(lower) && isNumber(upper) ? [lower, upper] : [-Math.PI, Math.PI];
     return form.slider({label: name, key: 'q', unit: prismatic ? 'm' : 'rad', low, high, ...at(posture, i)});
@@ -31,15 +31,16 @@ export function postureFields(form, page) {
 
 export function loopFields(form, page) {
   const design = () => page.design();
-  const slider = (key, label, unit, low, high, log = false) => form.slider({label, key, unit, low, high, log, ...at(design, key)});
+  const slider = (key, label, unit, low, high, log, more) =>
+    form.slider({label, key, unit, low, high, log, ...at(design, key), ...more});
   return [
-    form.slider({label: 'period', key: 'period', unit: 'ms', low: 0.1, high: 20, log: true,
-      get: () => design().period * 1000, set: (x) => { design().period = x / 1000; }}),
-    form.slider({label: 'delay', key: 'delay', unit: 'ticks', low: 0, high: 10,
-      get: () => design().delay, set: (x) => { design().delay = Math.round(x); }}),
+    slider('period', 'period', 'ms', 0.1, 20, true,
+      {get: () => design().period * 1000, set: (x) => { design().period = x / 1000; }}),
+    slider('delay', 'delay', 'ticks', 0, 10, false, {set: (x) => { design().delay = Math.round(x); }}),
     slider('cutoff', 'low-pass', 'Hz', 1, 1000, true),
-    form.check({label: 'velocity differenced', key: 'difference_velocity', ...at(design, 'difference_velocity', false)}),
-    slider('integral_time', 'integral', 's', 0.1, 100, true), slider('gain_margin', 'margin asked for', '', 1, 10)];
+    form.check({label: 'velocity differenced', key: 'difference_velocity', ...at(design, 'difference_velocity')}),
+    slider('integral_time', 'integral', 's', 0.1, 100, true),
+    slider('gain_margin', 'margin asked for', '', 1, 10, false)];
 }
 
 export function armFields(form, page) {
@@ -57,8 +58,8 @@ export function armFields(form, page) {
   const massOf = (mass) => ({...payload(), mass,
     ...(inertia && {inertia: inertia.map((line) => line.map((x) => x * mass / carried.mass))})});
   return [
-    form.slider({label: `payload${inertia ? ', its inertia grows with it' : ''}`, key: 'payload', unit: 'kg', low: 0, high: 20,
-      get: () => payload().mass, set: (x) => set('payload', massOf(x))}),
+    form.slider({label: `payload${inertia ? ', its inertia grows with it' : ''}`, key: 'payload', unit: 'kg',
+      low: 0, high: 20, get: () => payload().mass, set: (x) => set('payload', massOf(x))}),
     form.list({label: 'its centre', key: 'payload', unit: 'm', count: 3, get: () => payload().center,
       set: (x) => set('payload', {...payload(), center: x || [0, 0, 0]})}),
     joints('reflected_inertia', 'rotors', 'kg m²'),
@@ -67,6 +68,7 @@ export function armFields(form, page) {
     joints('viscous_friction', 'friction', 'N m s/rad'),
     joints('gear_stiffness', 'gears', 'N m/rad', 'none'),
     joints('gear_damping', 'their damping', 'N m s/rad'),
-    form.choice({label: 'joints measured', key: 'position_sensor', options: [['motor', 'at the motors'], ['link', 'at the links']],
+    form.choice({label: 'joints measured', key: 'position_sensor',
+      options: [['motor', 'at the motors'], ['link', 'at the links']],
       get: () => arm().position_sensor || measured, set: (x) => set('position_sensor', x === measured ? null : x)})];
 }

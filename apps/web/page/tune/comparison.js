@@ -6,14 +6,13 @@ import {kDesigns, nameOf} from './designs.js';
 
 const kMostGood = 1.5;  // a mode that is damped more creeps
 const kLeastGood = 0.6;
-const kMostMargin = 1e6;  // which the program looks for
-const kArmKeys = {payload: 'payload', reflected_inertia: 'rotors', viscous_friction: 'friction', gear_stiffness: 'gears',
-  gear_damping: "gears' damping", position_sensor: 'where joints are measured'};
+const kArmKeys = {payload: 'payload', reflected_inertia: 'rotors', viscous_friction: 'friction',
+  gear_stiffness: 'gears', gear_damping: "gears' damping", position_sensor: 'where joints are measured'};
 /// Name, value of an answer, and how it is written.
 const kTotals = [
   ['smallest ratio', (x) => x.smallest_ratio],
   ['fastest pole, 1/s', (x) => x.fastest_pole],
-  ['gain margin', (x) => x.gain_margin, (x) => (x === kMostMargin ? 'above 1e6' : number(x)), (x) => x !== null && x < 1],
+  ['gain margin', (x) => x.gain_margin, (x) => (x === 1e6 ? 'above 1e6' : number(x)), (x) => x !== null && x < 1],
   ['overshoot, %', (x) => (x.release.overshoot === null ? null : x.release.overshoot * 100)],
   ['settling to 2 %, s', (x) => x.release.settling_time],
   ['free motions', (x) => x.soft_or_zero, (x) => (x === null ? number(x) : String(x))]];
@@ -34,7 +33,7 @@ function modeCells(mode, answer) {
 function differentParts({setup, state}) {
   const told = (name, key) => {
     const value = (state[name].arm || {})[key] || setup.robot.keys[key] || setup.model[key] || null;
-    if (key === 'payload') return value && value.mass > 0 ? [value.mass, value.center || [0, 0, 0], value.inertia] : null;
+    if (key === 'payload') return value?.mass > 0 ? [value.mass, value.center || [0, 0, 0], value.inertia] : null;
     if (key === 'position_sensor') return value || 'motor';
     return value && value.map((x) => (x === 'none' ? null : x));
   };
@@ -47,27 +46,29 @@ function loopWords(name, found) {
   if (!found) return [];
   const {limit, damping_level: level, assumes} = found;
   return [
-    unstable(found) && `${name} is unstable in the sampled loop, so that its ratios and its motion are none that an arm ` +
-      'would show',
-    level && !level.kept && `No share of the ratio of ${name} leaves the loop the margin asked for: its springs are too ` +
-      'stiff, or the ratio too small for them',
-    level && level.share < 0.995 && `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % where the loop ` +
-      'bears least',
+    unstable(found) &&
+      `${name} is unstable in the sampled loop, so that its ratios and its motion are none that an arm would show`,
+    level && !level.kept && `No share of the ratio of ${name} leaves the loop the margin asked for: ` +
+      'its springs are too stiff, or the ratio too small for them',
+    level && level.share < 0.995 &&
+      `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % where the loop bears least`,
     assumes.length > 0 && `The loop of ${name} assumes: ${assumes.join(', ')}`,
     limit && `${name} is limited by a motion at ${number(limit.frequency, 3)} rad/s` +
       `${limit.joint ? `, most of it in ${limit.joint}` : ''}`].filter(Boolean);
 }
 
 export function fillComparison(page) {
-  const both = kDesigns.map((name) => page.answer(name)), count = Math.max(...both.map((x) => (x ? x.modes.length : 0)));
+  const both = kDesigns.map((name) => page.answer(name)), count = Math.max(...both.map((x) => x?.modes.length ?? 0));
   $('rows').replaceChildren(...Array.from({length: count}, (_, i) => {
     const modes = both.map((x) => x?.modes[i]);
-    return element('tr', {class: page.chosen === i + 1 ? 'chosen' : ''}, element('td', {}, markElement(i + 1), ` ${i + 1}`),
-      ...modes.flatMap((mode, k) => modeCells(mode, both[k])), cell(difference(...modes.map((mode) => mode?.damping_ratio))));
+    return element('tr', {class: page.chosen === i + 1 ? 'chosen' : ''},
+      element('td', {}, markElement(i + 1), ` ${i + 1}`), ...modes.flatMap((mode, k) => modeCells(mode, both[k])),
+      cell(difference(...modes.map((mode) => mode?.damping_ratio))));
   }));
   $('totals').replaceChildren(...kTotals.map(([name, get, write = number, isBad = () => false]) => {
     const values = both.map((x) => (x ? get(x) : null));
-    return element('tr', {}, cell(name), ...values.map((x) => cell(write(x), isBad(x) && 'bad')), cell(difference(...values)));
+    const cells = values.map((x) => cell(write(x), isBad(x) && 'bad'));
+    return element('tr', {}, cell(name), ...cells, cell(difference(...values)));
   }));
   const words = kDesigns.flatMap((name) => loopWords(nameOf(name), page.answer(name)));
   $('limits').textContent = words.map((text) => `${text}.`).join(' ');

@@ -38,14 +38,15 @@ export const crisp = forTask('crisp', ({design}, k, d, lost) => {
 
 export const cartesianImpedance = forTask('Cartesian-Impedance-Controller', ({q, design}, k, d, lost) => {
   const factorOf = (damping, stiffness) => round(stiffness > 0 ? damping / (2 * Math.sqrt(stiffness)) : 0);
-  const factors = d.map((x, i) => factorOf(x, k[i])), own = design.null_stiffness[0] || 0, {ratio} = design.null_damping;
+  const factors = d.map((x, i) => factorOf(x, k[i])), own = design.null_stiffness[0] || 0;
+  const {ratio} = design.null_damping;
   const factor = ratio && own > 0 ? round(ratio) : factorOf(nullDamping(design)[0] || 0, own);
   const axes = (v) => `{x: ${v[0]}, y: ${v[1]}, z: ${v[2]}}`;
   const wrench = (v) => `\n  force: ${axes(v)}\n  torque: ${axes(v.slice(3))}\n`;
   return notes([lost,
     [...factors, factor].some((f) => f > 1) && 'It takes damping factors from 0 to 1: those above are cut off there.',
-    nullSpaceNote(design), ratio && own > 0 && 'A damping ratio of the null space has no counterpart there: the factor ' +
-      'is that of an inertia of 1 kg m^2.',
+    nullSpaceNote(design), ratio && own > 0 &&
+      'A damping ratio of the null space has no counterpart there: the factor is that of an inertia of 1 kg m^2.',
     'A message cartesian_impedance_controller/ControllerConfig for set_config.']) +
     `cartesian_stiffness:${wrench(k)}cartesian_damping_factors:${wrench(factors)}nullspace_stiffness: ${own}\n` +
     `nullspace_damping_factor: ${factor}\nq_d_nullspace: [${q.join(', ')}]\n`;
@@ -57,8 +58,8 @@ export const frankaRos = forTask('franka_ros', ({design}, k, d) => {
   const given = stated.map((_, i) => (i < 3 ? linear : angular));
   const other = d.some((x, i) => Math.abs(x - 2 * Math.sqrt(given[i])) > 1e-6 * x) ||
     stated.some((x, i) => Math.abs(x - given[i]) > 1e-6 * x);
-  return notes([nullSpaceNote(design), other && 'It has one stiffness for translation and one for rotation, and damping ' +
-    'is always 2 sqrt(stiffness): the modes differ from those on the page.']) +
+  return notes([nullSpaceNote(design), other && 'It has one stiffness for translation and one for rotation, and ' +
+    'damping is always 2 sqrt(stiffness): the modes differ from those on the page.']) +
     `translational_stiffness: ${linear}\nrotational_stiffness: ${angular}\n` +
     `nullspace_stiffness: ${design.null_stiffness[0] || 0}\n`;
 });

@@ -1,6 +1,6 @@
 // A design as a text for Dashpot. `of` is {setup, q, design, answer}: what the program was asked, and what it said.
 import {rounded} from '../shared/numbers.js';
-import {asRows, compact, diagonal, isDiagonal} from './matrices.js';
+import {compact, diagonal, isDiagonal} from './matrices.js';
 
 const kDiffers = 'the modes differ from those on the page.';
 const json = JSON.stringify;
@@ -11,8 +11,8 @@ export function nullDamping({null_damping: damping, null_stiffness: stiffness}) 
   return Array.isArray(damping) ? damping : stiffness.map((k) => (damping.factor || 0) * Math.sqrt(k));
 }
 
-/// What the keys of a configuration's `robot` say of the arm: those that the program was started with, and what the page
-/// has in their place.
+/// What the keys of a configuration's `robot` say of the arm: as the program was started, and what the page has in
+/// their place.
 function armKeys({setup, design}) {
   const arm = design.arm || {}, keys = {...setup.robot.keys};
   for (const [key, value] of Object.entries(arm)) {
@@ -32,15 +32,17 @@ function rotors({setup, design}) {
 
 export function configuration(of) {
   const {setup, q, design, answer} = of, {stiffness, damping} = answer.gains, {config, urdf, base, tip} = setup.robot;
-  const pair = (told, K, C) => ({stiffness: compact(K), ...(told.ratio ? {damping_ratio: told.ratio} : {damping: compact(C)})});
+  const pair = ({ratio}, K, C) =>
+    ({stiffness: compact(K), ...(ratio ? {damping_ratio: ratio} : {damping: compact(C)})});
   const gains = design.mode === 'joint' ? {joint: pair(design.joint_damping, design.joint_stiffness, damping)} : {
     task: {...pair(design.damping, stiffness, damping), frame: design.frame || 'base'},
     null_space: pair(design.null_damping, design.null_stiffness, nullDamping(design))};
-  const loaded = config ? setup.designs[0] : {}, usually = (key, usual) => loaded[key] === undefined || loaded[key] === usual;
-  const unusual = (key, usual, name = key) => (design[key] === usual && usually(key, usual) ? {} : {[name]: design[key]});
+  const loaded = config ? setup.designs[0] : {};
+  const unusual = (key, usual, name = key) =>
+    (design[key] === usual && [undefined, usual].includes(loaded[key]) ? {} : {[name]: design[key]});
   const sampled = {...unusual('delay', 0), ...unusual('cutoff', 0), ...unusual('difference_velocity', false)};
-  const sections = {robot: {urdf, base, tip, ...armKeys(of)}, control: {period: design.period, mode: design.mode}, gains,
-    limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
+  const sections = {robot: {urdf, base, tip, ...armKeys(of)}, control: {period: design.period, mode: design.mode},
+    gains, limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
     analysis: Object.keys(sampled).length ? {sampled} : {}};
   const refused = answer.refused.map(({key, reason}) =>
     (key === 'q' ? `Here ${reason}.` : `The controller refuses it: ${key}: ${reason}.`));
@@ -60,12 +62,12 @@ const quoted = (word) => (/^[\w./:,=@%+-]+$/.test(word) ? word : `'${word.replac
 
 /// Options of the programs that tell the arm.
 function armOptions(of) {
-  const {setup} = of, {urdf, base, tip} = setup.robot, keys = armKeys(of), {mass, center, inertia: I} = keys.payload || {};
+  const {robot: {urdf, base, tip}, model} = of.setup, keys = armKeys(of), accepted = keys.accept_inertias;
+  const {mass, center, inertia: I} = keys.payload || {};
   const list = (name, values) => values && `--${name} ${values.join(',')}`;
-  const accepted = keys.accept_inertias;
   return [`--urdf ${quoted(urdf)} --base ${quoted(base)} --tip ${quoted(tip)}`,
     list('reflected-inertia', rotors(of)),
-    list('viscous-friction', keys.viscous_friction || setup.model.viscous_friction),
+    list('viscous-friction', keys.viscous_friction || model.viscous_friction),
     list('gear-stiffness', keys.gear_stiffness), list('gear-damping', keys.gear_damping),
     keys.gear_stiffness && keys.position_sensor === 'link' && '--position-sensor link',
     mass > 0 && list('payload',
@@ -77,7 +79,7 @@ function armOptions(of) {
 function gainOptions(design, stiffness, damping) {
   const prefix = design.mode === 'joint' ? 'joint-' : '', null_damping = nullDamping(design);
   return [`--${prefix}stiffness ${diagonal(stiffness).join(',')}`,
-    damping.factor !== undefined ? `--damping-factor ${damping.factor}` : `--${prefix}damping ${diagonal(damping).join(',')}`,
+    'factor' in damping ? `--damping-factor ${damping.factor}` : `--${prefix}damping ${diagonal(damping).join(',')}`,
     ...(prefix ? [] : [
       design.null_stiffness.some(Boolean) && `--null-stiffness ${design.null_stiffness.join(',')}`,
       null_damping.some(Boolean) && `--null-damping ${null_damping.join(',')}`,
@@ -87,10 +89,10 @@ function gainOptions(design, stiffness, damping) {
 }
 
 export function command(of) {
-  const {setup, q, design} = of, {period, delay, cutoff, integral_time: integral} = design, {config, keys} = setup.robot;
-  const [stiffness, damping] = design.mode === 'joint' ? [design.joint_stiffness, design.joint_damping]
-    : [design.stiffness, design.damping];
-  const diagonals = isDiagonal(stiffness) && (damping.factor !== undefined || (Array.isArray(damping) && isDiagonal(damping)));
+  const {q, design} = of, {period, delay, cutoff, integral_time: integral} = design, {config, keys} = of.setup.robot;
+  const prefix = design.mode === 'joint' ? 'joint_' : '';
+  const [stiffness, damping] = ['stiffness', 'damping'].map((key) => design[prefix + key]);
+  const diagonals = isDiagonal(stiffness) && ('factor' in damping || (Array.isArray(damping) && isDiagonal(damping)));
   if (!diagonals || design.null_damping?.ratio || design.inertia_blocks) {
     return notes(['The damping is a matrix: save "matrices for dashpot analyze" as system.json.']) +
       'dashpot analyze system.json\n';
@@ -98,10 +100,11 @@ export function command(of) {
   const without = ['tool', 'include_off_chain'].filter((key) => keys[key] !== undefined);
   const loop = period > 0 ? [`--period ${period}`, delay && `--delay ${delay}`, cutoff && `--cutoff ${cutoff}`,
     design.difference_velocity && '--difference-velocity', integral && `--integral-time ${integral}`] : [];
-  const words = ['dashpot audit', ...armOptions(of), `--q ${q.join(',')}`, ...gainOptions(design, stiffness, damping), ...loop];
+  const gains = gainOptions(design, stiffness, damping);
+  const words = ['dashpot audit', ...armOptions(of), `--q ${q.join(',')}`, ...gains, ...loop].filter(Boolean);
   return notes([config && `The arm as ${config} has it.`,
     without.length && `There is no option for its ${without.join(' and ')}: ${kDiffers}`]) +
-    `${words.filter(Boolean).join(' \\\n    ')}\n`;
+    `${words.join(' \\\n    ')}\n`;
 }
 
 /// The 4 x 4 matrix of a frame.
@@ -114,11 +117,13 @@ function poseRows({position: [x, y, z], rpy}) {
 /// Arguments of Robot.from_urdf.
 function robotArguments(of) {
   const {urdf, base, tip} = of.setup.robot, keys = {...armKeys(of), reflected_inertia: rotors(of)}, {payload} = keys;
-  const named = ['gravity', 'accept_inertias', 'reflected_inertia', 'viscous_friction', 'coulomb_friction', 'gear_damping',
-    'position_sensor'].filter((key) => keys[key]).map((key) => `${key}=${keys[key] === true ? 'True' : json(keys[key])}`);
+  const named = ['gravity', 'accept_inertias', 'reflected_inertia', 'viscous_friction', 'coulomb_friction',
+    'gear_damping', 'position_sensor'].filter((key) => keys[key])
+    .map((key) => `${key}=${keys[key] === true ? 'True' : json(keys[key])}`);
   const gears = keys.gear_stiffness?.map((k) => (k === 'none' ? 'float("inf")' : k)).join(', ');
-  const carried = payload && payload.mass > 0 ? [`payload_mass=${payload.mass}`,
-    `payload_center=${json(payload.center || [0, 0, 0])}`, payload.inertia && `payload_inertia=${json(payload.inertia)}`] : [];
+  const {mass, center, inertia} = payload || {};
+  const carried = mass > 0 ? [`payload_mass=${mass}`, `payload_center=${json(center || [0, 0, 0])}`,
+    inertia && `payload_inertia=${json(inertia)}`] : [];
   return [...[urdf, base, tip].map((word) => json(word)), ...named,
     keys.include_off_chain === false && 'include_off_chain=False', gears && `gear_stiffness=[${gears}]`, ...carried,
     keys.tool && `tool=${json(poseRows(keys.tool))}`].filter(Boolean).join(', ');
@@ -126,7 +131,7 @@ function robotArguments(of) {
 
 export function python(of) {
   const {q, design, answer} = of, {stiffness, damping} = answer.gains, joint = design.mode === 'joint';
-  const prefix = joint ? 'joint' : 'task', told = joint ? design.joint_damping : design.damping, rest = design.null_damping;
+  const [prefix, told] = joint ? ['joint', design.joint_damping] : ['task', design.damping], rest = design.null_damping;
   const gains = [`${prefix}_stiffness=${json(compact(joint ? design.joint_stiffness : stiffness))}`,
     told.ratio ? `${prefix}_damping_ratio=${told.ratio}` : `${prefix}_damping=${json(compact(damping))}`,
     ...(joint ? [] : [`null_stiffness=${json(design.null_stiffness)}`,

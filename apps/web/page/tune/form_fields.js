@@ -1,6 +1,6 @@
 // Fields of a form: a slider beside a number with its unit, choices, lists, matrices. Each has refresh(), which shows
 // the value as it is.
-import {element} from '../shared/dom.js';
+import {button, element} from '../shared/dom.js';
 import {number, plain, rounded} from '../shared/numbers.js';
 
 const kSteps = 400;
@@ -9,7 +9,8 @@ const kUnits = {rad: {rad: 1, deg: Math.PI / 180, '°': Math.PI / 180}, m: {m: 1
 /// Returns the numbers of a text, "-45 deg, 0.3", in rad, m or kg as `unitOf(i)` says; the word `none` is null. Returns
 /// nothing for other texts.
 export function readNumbers(text, unitOf, none) {
-  const part = /\s*(?:([a-z]+)|([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(deg|°|rad|mm|m|kg|g)?)(?:\s*[,;]|\s+|$)\s*/iy;
+  const part =
+    /\s*(?:([a-z]+)|([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(deg|°|rad|mm|m|kg|g)?)(?:\s*[,;]|\s+|$)\s*/iy;
   const words = text.replaceAll('−', '-').replace(/^\s*\[|\]\s*$/g, ''), found = [];
   while (part.lastIndex < words.length) {
     const told = part.exec(words);
@@ -69,7 +70,8 @@ export class Form {
   /// `log` sliders have zero at their left end.
   slider({label, key, unit, low, high, log, get, set}) {
     const name = `${label}, ${unit}`, span = high / low;
-    const toValue = (p) => (!log ? low + (high - low) * p / kSteps : p <= 0 ? 0 : low * span ** ((p - 1) / (kSteps - 1)));
+    const toValue = (p) => (!log ? low + (high - low) * p / kSteps
+      : p <= 0 ? 0 : low * span ** ((p - 1) / (kSteps - 1)));
     const toPlace = (v) => (!log ? kSteps * (v - low) / (high - low)
       : v <= 0 ? 0 : 1 + (kSteps - 1) * Math.log(v / low) / Math.log(span));
     const take = (ended) => () => this.edit(() => set(rounded(toValue(Number(range.value)), 3)), ended);
@@ -98,7 +100,8 @@ export class Form {
 
   /// Numbers between commas, one for all, or nothing for null.
   list({label, key, unit, count, get, set, none}) {
-    const name = `${label}, ${unit}`, input = element('input', textAttributes(name, {class: 'wide', spellcheck: 'false'}));
+    const name = `${label}, ${unit}`;
+    const input = element('input', textAttributes(name, {class: 'wide', spellcheck: 'false'}));
     const {note, refresh} = textInput(input, {get,
       wanted: `${count} numbers in ${unit}, or one for all${none ? `; ${none} is one` : ''}`,
       text: (values) => (values ? values.map((x) => (x === null ? none : plain(x))).join(', ') : ''),
@@ -119,15 +122,16 @@ export class Form {
         get: () => get()[i][j], set: (x) => set(i, j, x), text: (x) => String(rounded(x, 4))})));
     const grid = element('div', {class: 'matrix', 'data-key': key}, ...cells.map(({input}) => input));
     grid.style.setProperty('--columns', n);
-    return {element: element('div', {}, element('h3', {}, label), grid, note), refresh: () => cells.forEach((cell, k) => {
+    const refresh = () => cells.forEach((cell, k) => {
       const i = Math.floor(k / n), j = k % n;
       cell.refresh();
       cell.input.title = `${n} x ${n}, entry ${names[i]} ${names[j]}: ${plain(get()[i][j])}`;
-    })};
+    });
+    return {element: element('div', {}, element('h3', {}, label), grid, note), refresh};
   }
 
   button(label, click) {
-    return {element: element('div', {class: 'row'}, element('button', {type: 'button', click}, label)), refresh: () => {}};
+    return {element: element('div', {class: 'row'}, button(click, {}, label)), refresh: () => {}};
   }
 }
 

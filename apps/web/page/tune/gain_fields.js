@@ -5,12 +5,13 @@ import {asRows, diagonal, kindOf} from './matrices.js';
 import {kTaskAxes} from './designs.js';
 
 // Units and ends of the sliders.
-const kTranslation = {stiffness: {unit: 'N/m', low: 1, high: 1e4}, damping: {unit: 'N s/m', low: 0.01, high: 1000}};
-const kRotation = {stiffness: {unit: 'N m/rad', low: 0.1, high: 1000}, damping: {unit: 'N m s/rad', low: 0.00316, high: 100}};
-const kPrismatic = {stiffness: {unit: 'N/m', low: 1, high: 1e5}, damping: {unit: 'N s/m', low: 0.01, high: 1e4}};
-const kRevolute = {stiffness: {unit: 'N m/rad', low: 0.1, high: 1e4}, damping: {unit: 'N m s/rad', low: 0.00316, high: 300}};
+const linear = (most, mostDamping) =>
+  ({stiffness: {unit: 'N/m', low: 1, high: most}, damping: {unit: 'N s/m', low: 0.01, high: mostDamping}});
+const angular = (most, mostDamping) =>
+  ({stiffness: {unit: 'N m/rad', low: 0.1, high: most}, damping: {unit: 'N m s/rad', low: 0.00316, high: mostDamping}});
 const kUsual = {ratio: {ratio: 0.7}, factor: {factor: 2}};
 const kRatio = ['ratio', 'damping ratio'], kFactor = ['factor', 'factor of √stiffness'];
+const kDiagonal = ['diagonal', 'diagonal'], kFull = ['full', 'full matrix'];
 
 /// The words on which the form's fields depend; where they change, it is built again.
 export function structure(design) {
@@ -32,19 +33,21 @@ function pair(form, page, {stiffness, damping, names, ranges}) {
     : names.map((name, i) => form.slider({label: `${label} ${name}`, key, log: true, ...ranges[i][label],
       ...at(() => design()[key], i)})));
   return [
-    form.choice({label: 'stiffness', key: `${stiffness}_kind`, options: [['diagonal', 'diagonal'], ['full', 'full matrix']],
+    form.choice({label: 'stiffness', key: `${stiffness}_kind`, options: [kDiagonal, kFull],
       get: () => kindOf(design()[stiffness]),
       set: (to) => { design()[stiffness] = (to === 'full' ? asRows : diagonal)(design()[stiffness]); }}),
     ...entries(stiffness, 'stiffness', 'N/m, N, N m/rad'),
     form.choice({label: 'damping', key: `${damping}_kind`,
-      options: [[kRatio[0], `${kRatio[1]}, at every posture`], kFactor, ['diagonal', 'diagonal'], ['full', 'full matrix']],
+      options: [[kRatio[0], `${kRatio[1]}, at every posture`], kFactor, kDiagonal, kFull],
       get: () => kindOf(design()[damping]), set: (to) => {
-        const now = (page.actingDamping() || asRows(Array(names.length).fill(0))).map((row) => row.map((x) => rounded(x, 6)));
+        const acts = page.actingDamping() || asRows(Array(names.length).fill(0));
+        const now = acts.map((row) => row.map((x) => rounded(x, 6)));
         design()[damping] = kUsual[to] ? {...kUsual[to]} : to === 'full' ? now : diagonal(now);
       }}),
     form.button('Propose a diagonal', () => page.propose(damping, false)),
     form.button('Propose a matrix', () => page.propose(damping, true)),
-    ...(kUsual[kind] ? [relative(form, design, damping, kind, '√kg')] : entries(damping, 'damping', 'N s/m, N s, N m s/rad'))];
+    ...(kUsual[kind] ? [relative(form, design, damping, kind, '√kg')]
+      : entries(damping, 'damping', 'N s/m, N s, N m s/rad'))];
 }
 
 function nullSpaceFields(form, design, n) {
@@ -67,14 +70,15 @@ function nullSpaceFields(form, design, n) {
 /// Fields of the gains of the design that is edited.
 export function gainFields(form, page) {
   const {joints} = page.setup.arm, design = () => page.design();
-  const mode = form.choice({label: 'springs', key: 'mode', options: [['cartesian', 'at the tip'], ['joint', 'in the joints']],
-    ...at(design, 'mode')});
+  const mode = form.choice({label: 'springs', key: 'mode',
+    options: [['cartesian', 'at the tip'], ['joint', 'in the joints']], ...at(design, 'mode')});
   if (design().mode === 'joint') {
     return [mode, ...pair(form, page, {stiffness: 'joint_stiffness', damping: 'joint_damping',
-      names: joints.map((_, i) => String(i + 1)), ranges: joints.map((joint) => (joint.prismatic ? kPrismatic : kRevolute))})];
+      names: joints.map((_, i) => String(i + 1)),
+      ranges: joints.map(({prismatic}) => (prismatic ? linear(1e5, 1e4) : angular(1e4, 300)))})];
   }
   return [mode, ...pair(form, page, {stiffness: 'stiffness', damping: 'damping', names: kTaskAxes,
-    ranges: kTaskAxes.map((_, i) => (i < 3 ? kTranslation : kRotation))}),
+    ranges: kTaskAxes.map((_, i) => (i < 3 ? linear(1e4, 1000) : angular(1000, 100)))}),
   form.choice({label: 'axes', key: 'frame', options: [['base', 'of the base'], ['tool', 'of the tool']],
     ...at(design, 'frame', 'base')}),
   form.choice({label: 'rotation error', key: 'rotation',

@@ -34,7 +34,7 @@ function makeFields(page) {
     }
     for (const field of [...posture, ...fields]) field.refresh();
     $('design_name').textContent = nameOf(state.edited);
-    for (const button of $('which').children) button.setAttribute('aria-pressed', button.dataset.design === state.edited);
+    for (const one of $('which').children) one.setAttribute('aria-pressed', one.dataset.design === state.edited);
     $('undo').disabled = !store.past.length;
     $('redo').disabled = !store.future.length;
     for (const choice of ['place', 'motion']) $(choice).value = state[choice];
@@ -56,10 +56,11 @@ function makeParts(page, redraw) {
     mode.eigenvalues.map(([re, im], which) => ({label: i + 1, which, re, im, bound: mode.error_bound})));
   return {
     arm: (now) => {
-      const n = page.setup.q.length, mode = page.chosen && page.answer()?.modes[page.chosen - 1];
-      arm.draw(page.setup.arm, page.state.q, mode ? {label: page.chosen, re: mode.shape.slice(0, n).map(([re]) => re),
-        im: mode.shape.slice(0, n).map(([, im]) => im), phase: reducedMotion() ? 0 : now / 400, amplitude: 0.25} : null);
-      if (mode && !reducedMotion()) redraw.later('arm');
+      const {chosen, setup, state} = page, still = reducedMotion();
+      const shape = chosen && page.answer()?.modes[chosen - 1]?.shape.slice(0, setup.q.length);
+      arm.draw(setup.arm, state.q, shape ? {label: chosen, re: shape.map(([re]) => re), im: shape.map(([, im]) => im),
+        phase: still ? 0 : now / 400, amplitude: 0.25} : null);
+      if (shape && !still) redraw.later('arm');
     },
     poles: () => {
       const others = polesOf(page.other()).filter(({im}) => im >= 0);
@@ -103,7 +104,8 @@ function listenToControls(page, redraw) {
     page.current = false;
     redraw.soon('texts');
   };
-  listen('change', {place: choose('place'), motion: choose('motion'), format: retell, arrow_mode: retell, preset: () => {
+  listen('change', {place: choose('place'), motion: choose('motion'), format: retell, arrow_mode: retell});
+  listen('change', {preset: () => {
     const preset = setup.presets.find(({name}) => name === $('preset').value);
     if (preset) edit((state) => { Object.assign(state[state.edited], structuredClone(preset.design)); });
     $('preset').value = '';

@@ -5,8 +5,8 @@ import {isNumber, number, plain} from '../shared/numbers.js';
 /// The reason why each joint outside its limits is so.
 function outside(page) {
   return page.setup.arm.joints.flatMap(({name, lower, upper, prismatic}, i) => {
-    const x = page.state.q[i], above = !isNumber(lower) || x >= lower - 1e-9, below = !isNumber(upper) || x <= upper + 1e-9;
-    if (above && below) return [];
+    const x = page.state.q[i], within = x >= (lower ?? -Infinity) - 1e-9 && x <= (upper ?? Infinity) + 1e-9;
+    if (within) return [];
     const limits = [lower, upper].map((limit) => (isNumber(limit) ? number(limit) : 'none')).join(' to ');
     const degrees = !prismatic && Math.abs(x) > 2 * Math.PI ? ` Degrees are written as ${plain(x)} deg.` : '';
     return [`${name} at ${number(x)} ${page.unitOf(i)} is outside its limits, ${limits}.${degrees}`];

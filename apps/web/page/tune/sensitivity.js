@@ -1,5 +1,5 @@
 // What moves a damping ratio: an arrow for each entry of damping and stiffness, which takes a step of it.
-import {$, element} from '../shared/dom.js';
+import {$, button, element} from '../shared/dom.js';
 import {isNumber, number, rounded} from '../shared/numbers.js';
 import {kTaskAxes} from './designs.js';
 import {compact} from './matrices.js';
@@ -17,7 +17,7 @@ function stepOf(which, {damping, stiffness}, i, j) {
 /// Adds a step to an entry of the matrix that acts, which then is given as a matrix.
 function take(page, which, matrix, i, j, step) {
   const {mode, rotation} = page.design(), key = mode === 'joint' ? `joint_${which}` : which;
-  const half = which === 'stiffness' && rotation === 'half-quaternion' && mode !== 'joint';  // acts by half of what is given
+  const half = which === 'stiffness' && rotation === 'half-quaternion' && mode !== 'joint';  // half of it acts
   const given = (r, c) => (half && r > 2 && c > 2 ? 2 : 1);
   const next = matrix.map((line, r) => line.map((x, c) => x * given(r, c)));
   next[i][j] += step * given(i, j);
@@ -30,8 +30,8 @@ function arrow(name, value, step, changes, chosen, click) {
   const now = changes[chosen], none = Math.abs(now) < kLeast;
   const said = `${name} = ${number(value)}; ${number(step, 2)} more changes the ratios of modes 1.. by ` +
     changes.map((change) => (change > 0 ? '+' : '') + number(change, 2)).join(', ');
-  return element('button', {type: 'button', class: none ? 'none' : now > 0 ? 'up' : 'down', title: said,
-    'aria-label': said, click}, none ? '·' : `${now > 0 ? '↑' : '↓'}${number(Math.abs(now), 2)}`);
+  return button(click, {class: none ? 'none' : now > 0 ? 'up' : 'down', title: said, 'aria-label': said},
+    none ? '·' : `${now > 0 ? '↑' : '↓'}${number(Math.abs(now), 2)}`);
 }
 
 /// The mode whose ratio is looked at: as chosen, or the one of the smallest ratio; -1 where there is none.
@@ -50,8 +50,8 @@ export function fillSensitivity(page) {
   const answer = page.answer(), asked = page.asked[page.state.edited], joint = page.design().mode === 'joint';
   const sensitivity = answer && (asked.design.mode === 'joint') === joint ? answer.sensitivity : null;
   const chosen = chosenMode(answer ? answer.modes : []);
-  $('arrow_note').textContent = sensitivity ? 'change by a step: a quarter of a damping, a tenth of a stiffness; click to ' +
-    'take it, with Shift the other way' : 'not for gains times inertia';
+  $('arrow_note').textContent = !sensitivity ? 'not for gains times inertia'
+    : 'change by a step: a quarter of a damping, a tenth of a stiffness; click to take it, with Shift the other way';
   const labels = joint ? page.setup.arm.joints.map((_, i) => String(i + 1)) : kTaskAxes;
   for (const which of ['damping', 'stiffness']) {
     const matrix = sensitivity && chosen >= 0 && answer.gains[which];

@@ -22,13 +22,13 @@ export class Tuning {
   constructor(setup, changed, redraw) {
     keepErrors(this.errors);
     Object.assign(this, {setup, redraw});
-    this.store = new Store({q: setup.q, place: 'tip/0', motion: 'step', edited: 'a', a: setup.designs[0], b: setup.designs[1]},
-      (ended) => {
-        this.current = false;
-        this.moved = this.workspace.moved = performance.now();
-        changed(ended);
-        this.ask();
-      });
+    const {q, designs: [a, b]} = setup;
+    this.store = new Store({q, place: 'tip/0', motion: 'step', edited: 'a', a, b}, () => {
+      this.current = false;
+      this.moved = this.workspace.moved = performance.now();
+      changed();
+      this.ask();
+    });
     this.workspace = new Workspace(setup.token, () => redraw('workspace'));
     this.questions = Object.fromEntries(kDesigns.map((name) =>
       [name, new Newest(setup.token, '/design', (heard, asked) => this.hear(name, heard, asked))]));
@@ -43,7 +43,8 @@ export class Tuning {
   wantedRatio() { return this.design().damping.ratio || this.design().joint_damping.ratio || 0.7; }
   /// The matrix of damping that acts, or null where the answer is of other springs.
   actingDamping() {
-    return this.answer() && this.asked[this.state.edited].design.mode === this.design().mode ? this.answer().gains.damping : null;
+    const asked = this.asked[this.state.edited];
+    return this.answer() && asked.design.mode === this.design().mode ? this.answer().gains.damping : null;
   }
   choose(label) {
     this.chosen = this.chosen === label ? null : label;
@@ -77,24 +78,28 @@ export class Tuning {
     this.moved = 0;
   }
 
-  /// Takes the damping of the wanted ratio at this posture: the matrix for all modes, or a diagonal whose smallest ratio
-  /// it is.
+  /// Takes the damping of the wanted ratio at this posture: the matrix for all modes, or a diagonal of whose ratios it
+  /// is the smallest.
   async propose(key, full) {
     const {edited: name, q, place} = this.state, ratio = this.wantedRatio();
     const ask = (damping) =>
       post(this.setup.token, '/design', JSON.stringify({q, place, design: {...this.design(name), [key]: damping}}));
-    let found = await ask({ratio});
-    const singular = found.error ? '' : found.refused.find((refused) => refused.key === 'q')?.reason || '';
-    let damping = found.error || singular ? null : found.gains.damping;
-    for (let turn = 0; damping && !full && turn < 8; ++turn) {
-      const diagonal = damping.map((x, i) => (turn ? x * ratio / found.smallest_ratio : x[i]));
-      found = await ask(diagonal);
-      damping = found.error || !(found.smallest_ratio > 0) ? null : diagonal;
-      if (damping && Math.abs(found.smallest_ratio - ratio) < 1e-3) break;
-    }
-    this.problem[name] = damping ? '' : singular || found.error || 'damping: no diagonal gives the ratio';
-    const round = (x) => rounded(x, 6);
-    if (damping) this.edit((state) => { state[name][key] = damping.map((x) => (full ? x.map(round) : round(x))); }, true);
+    const first = await ask({ratio}), singular = first.refused?.find((refused) => refused.key === 'q')?.reason || '';
+    const whole = first.error || singular ? null : first.gains.damping;
+    const {damping, error} = full || !whole ? {damping: whole, error: first.error}
+      : await this.scaleDiagonal(whole.map((row, i) => row[i]), ratio, ask);
+    this.problem[name] = damping ? '' : singular || error || 'damping: no diagonal gives the ratio';
+    const round = (x) => (full ? x.map((entry) => rounded(entry, 6)) : rounded(x, 6));
+    if (damping) this.edit((state) => { state[name][key] = damping.map(round); }, true);
     else this.redraw('texts');
+  }
+  /// Scales a diagonal until its smallest ratio is so: {damping}, or {error}.
+  async scaleDiagonal(damping, ratio, ask) {
+    for (let turn = 1, scaled = damping; ; ++turn) {
+      const {error, smallest_ratio: smallest} = await ask(scaled);
+      if (error || !(smallest > 0)) return {error};
+      if (turn === 8 || Math.abs(smallest - ratio) < 1e-3) return {damping: scaled};
+      scaled = scaled.map((x) => x * ratio / smallest);
+    }
   }
 }

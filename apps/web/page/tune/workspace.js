@@ -1,5 +1,5 @@
 // Ratios and margins over many postures: asked for in the background, drawn, and the worst of them to go to.
-import {$, element, fill} from '../shared/dom.js';
+import {$, button, fill} from '../shared/dom.js';
 import {number, rounded} from '../shared/numbers.js';
 import {kDesigns, kStyles, nameOf} from './designs.js';
 import {post} from './requests.js';
@@ -8,7 +8,7 @@ const kPostures = 2000;
 const kMost = 100;  // postures in a part
 const kRest = 150;  // ms without a change before the next part
 const kPart = 20;   // ms that a part is to take
-const kKeys = ['smallest_ratio', 'gain_margin'];
+const kWorst = {smallest_ratio: 'ratio', gain_margin: 'margin'};
 
 /// The numbers of many postures for the designs, a part at a time, and none while something moves: a slider waits for
 /// one part at most. A design that changes begins again.
@@ -28,11 +28,14 @@ export class Workspace {
   }
   async run() {
     this.busy = true;
-    const open = () => Object.keys(this.found).find((one) => this.found[one].postures < kPostures && !this.found[one].error);
-    for (let name = open(); name; name = open()) {
-      for (let left; (left = this.moved + kRest - performance.now()) > 0;) await new Promise((done) => setTimeout(done, left));
-      const found = this.found[name], began = performance.now(), count = Math.min(this.count, kPostures - found.postures);
-      const body = `{"design":${this.asked[name]},"seed":1,"first":${found.postures},"count":${count}}`;
+    const isOpen = ([, {postures, error}]) => postures < kPostures && !error;
+    for (let open; (open = Object.entries(this.found).find(isOpen));) {
+      for (let left; (left = this.moved + kRest - performance.now()) > 0;) {
+        await new Promise((done) => setTimeout(done, left));
+      }
+      const [name] = open, found = this.found[name], began = performance.now(), first = found.postures;
+      const count = Math.min(this.count, kPostures - first);
+      const body = `{"design":${this.asked[name]},"seed":1,"first":${first},"count":${count}}`;
       const part = await post(this.token, '/workspace', body);
       this.count = Math.round(Math.min(kMost, Math.max(2, count * kPart / (performance.now() - began))));
       if (this.found[name] !== found) continue;  // of a design that has changed
@@ -47,7 +50,7 @@ export class Workspace {
       return;
     }
     found.postures += part.count;
-    for (const key of kKeys) {
+    for (const key of Object.keys(kWorst)) {
       found[key].push(...part[key].filter((x) => x !== null));
       const worst = part.worst[key];
       if (worst && !(found.worst[key]?.value <= worst.value)) found.worst[key] = worst;
@@ -80,11 +83,9 @@ export function drawWorkspace(page, {ratios, margins}) {
   drawShares(margins, found, 'gain_margin', 'postures with less margin, %; gain margin');
   $('workspace_note').textContent = kDesigns.filter((name) => found[name])
     .map((name) => `${nameOf(name)}: ${found[name].error || `${found[name].postures} postures`}`).join(', ');
-  const worst = kDesigns.flatMap((name) => Object.entries(found[name]?.worst || {}).map(([key, {value, q}]) => ({name, q,
-    text: `${nameOf(name)}: worst ${key === 'gain_margin' ? 'margin' : 'ratio'} ${number(value, 3)}`})));
-  fill('worst', worst.map(({text}) => text).join(), () => worst.map(({name, q, text}) =>
-    element('button', {type: 'button', click: () => page.edit((state) => {
-      state.q = q.map((x) => rounded(x, 8));
-      state.edited = name;
-    }, true)}, text)));
+  const text = (name, key, value) => `${nameOf(name)}: worst ${kWorst[key]} ${number(value, 3)}`;
+  const worst = kDesigns.flatMap((name) => Object.entries(found[name]?.worst || {})
+    .map(([key, {value, q}]) => ({text: text(name, key, value), to: {q: q.map((x) => rounded(x, 8)), edited: name}})));
+  fill('worst', worst.map((one) => one.text).join(), () => worst.map((one) =>
+    button(() => page.edit((state) => Object.assign(state, structuredClone(one.to)), true), {}, one.text)));
 }
