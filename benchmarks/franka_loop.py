@@ -10,6 +10,7 @@ import sys
 import time
 
 import pylibfranka
+
 from dashpot import _libfranka, franka
 
 

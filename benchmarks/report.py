@@ -40,7 +40,7 @@ def merge(parts):
             if row.get("run_type") != "aggregate":
                 repeated[plain(row)["name"]].append(plain(row))
     rows = []
-    for name, runs in repeated.items():
+    for runs in repeated.values():
         times = sorted(run.get("cpu_time", 0) for run in runs)
         row = dict(runs[len(runs) // 2])
         for key in TIMES:

@@ -22,9 +22,8 @@ RATIO = 0.7
 
 
 def dashpot(*arguments, text=None):
-    done = subprocess.run([sys.argv[1], *arguments, "--json"], input=text, text=True, check=True,
-                          stderr=subprocess.PIPE,  # steps of a search are outside the limits
-                          stdout=subprocess.PIPE)
+    # Standard error is not shown, because steps of a search are outside the limits.
+    done = subprocess.run([sys.argv[1], *arguments, "--json"], input=text, text=True, check=True, capture_output=True)
     return json.loads(done.stdout)
 
 

@@ -59,8 +59,7 @@ def main():
               f"{math.degrees(held[-1][i + 1]):13.3f}")
     with open(table, "w", encoding="ascii") as file:
         for row, q, other in zip(free, result["response"]["position"], held):
-            numbers = [f(i) for i in JOINTS
-                       for f in (lambda i: row[i + 1], lambda i: q[i], lambda i: other[i + 1])]
+            numbers = [x for i in JOINTS for x in (row[i + 1], q[i], other[i + 1])]
             print(f"{row[0]:.4f}", *(f"{math.degrees(x):.5f}" for x in numbers), file=file)
 
 

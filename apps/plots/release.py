@@ -4,9 +4,10 @@
 usage: release.py DASHPOT SCENE_JSON CSV
 
 CSV is what `dashpot run --csv` wrote; SCENE_JSON names the robot, K_C, C_C (or the damping ratio that
-the controller holds) and the joint position at which the springs are fixed. Mass and Jacobian there come from `dashpot inspect`, the closed-form
-response from `dashpot analyze`. Prints a table: time (s), displacement of the tip along y (mm) as
-simulated, and as predicted; after a line with the smallest damping ratio that is predicted.
+the controller holds) and the joint position at which the springs are fixed. Mass and Jacobian there
+come from `dashpot inspect`, the closed-form response from `dashpot analyze`. Prints a table: time (s),
+displacement of the tip along y (mm) as simulated, and as predicted; after a line with the smallest
+damping ratio that is predicted.
 """
 import csv
 import json

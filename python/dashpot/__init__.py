@@ -11,12 +11,11 @@ from ._arch import load_core as _load_core
 
 __build__ = _load_core()  # for which processors the code in use was compiled
 
-from ._analysis import (DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities,
-                        design_damping, modes, receptance, response, sampled_modes, sensitivities)
-from ._audit import (Audit, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit,
-                     audit)
-from ._controller import (Controller, Setpoint, Snapshot, Status, TrackedModes,
-                          TrackedSampledModes)
+from ._analysis import (  # isort: skip
+    DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities, design_damping, modes, receptance, response,
+    sampled_modes, sensitivities)
+from ._audit import Audit, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit, audit
+from ._controller import Controller, Setpoint, Snapshot, Status, TrackedModes, TrackedSampledModes
 from ._core import Error
 from ._identification import Identification, MeasuredModes, identify
 from ._log import Log, LoggedMode, read_log

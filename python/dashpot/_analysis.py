@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._results import (Array, ComplexArray, Modes, Result, TextArray, make_modes, stack, to_matrix,
-                       to_numbers, to_vector)
+from ._results import Array, ComplexArray, Modes, Result, TextArray, make_modes, stack, to_matrix, to_numbers, to_vector
 
 
 def _impedance(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,

@@ -43,7 +43,7 @@ def load_core() -> str:
         core = importlib.util.module_from_spec(spec)
         sys.modules[name] = core
         spec.loader.exec_module(core)
-        setattr(sys.modules[str(__package__)], "_core", core)
+        setattr(sys.modules[str(__package__)], "_core", core)  # noqa: B010  # a module has no such attribute
     from . import _core
     if wanted not in ("", _core.__build__):
         raise ImportError(f"DASHPOT_ARCH: this package has no build for '{wanted}'")

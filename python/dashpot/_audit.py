@@ -5,7 +5,8 @@ from __future__ import annotations
 import concurrent.futures
 import dataclasses
 import warnings
-from typing import Any, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -172,8 +173,9 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     I - J^+ J. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
     (Hz; 0: none), `difference_velocity`, and an integral of the springs with `integral_time` (s; 0:
     none), which counts in the gain margin alone. The torque against gravity is as late as the rest,
-    unless it is `ideal_gravity`, such as of a robot that holds itself. Where the robot has no reflected inertia, the posture tells
-    how much would be enough for a gain margin of `margin`. Modes below `soft_frequency` (rad/s) are soft.
+    unless it is `ideal_gravity`, such as of a robot that holds itself. Where the robot has no
+    reflected inertia, the posture tells how much would be enough for a gain margin of `margin`. Modes
+    below `soft_frequency` (rad/s) are soft.
 
     An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
     results are the same to the last bit whatever executor and however many workers.

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import collections
+import functools
 import importlib
 import json
 import os
 import pathlib
 import warnings
-from typing import Any, Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any, Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -153,22 +155,22 @@ def _read_mcap(path: str, wanted: Callable[[str, str], bool], topics: _Topics) -
         raise Error(f"{path}: is MCAP: pip install mcap, which reads it") from None
     store, known = None, set[str]()
     decoders: dict[int, Callable[[bytes], Any]] = {}
+
+    def decode(name: str, schema: Any, channel: Any, data: bytes) -> Any:
+        nonlocal store
+        if channel.id not in decoders:
+            if channel.message_encoding == "cdr" and store is None:
+                store = _typestore(path)
+                known.update(store.fielddefs)
+            decoders[channel.id] = _decoder(store, known, _ros_name(name), channel.message_encoding, schema)
+        return decoders[channel.id](data)
+
     with open(path, "rb") as file:
         for schema, channel, message in make_reader(file).iter_messages():
             name = schema.name if schema is not None else ""
-            if not wanted(channel.topic, name):
-                continue
-
-            def decode() -> Any:
-                nonlocal store
-                if channel.id not in decoders:
-                    if channel.message_encoding == "cdr" and store is None:
-                        store = _typestore(path)
-                        known.update(store.fielddefs)
-                    decoders[channel.id] = _decoder(store, known, _ros_name(name),
-                                                    channel.message_encoding, schema)
-                return decoders[channel.id](message.data)
-            topics.add(channel.topic, name, message.log_time, decode)
+            if wanted(channel.topic, name):
+                topics.add(channel.topic, name, message.log_time,
+                           functools.partial(decode, name, schema, channel, message.data))
 
 
 def _typestore(path: str) -> Any:
@@ -181,13 +183,14 @@ def _typestore(path: str) -> Any:
 
 def _read_rosbag(path: str, wanted: Callable[[str, str], bool], topics: _Topics) -> None:
     store = _typestore(path)
-    with importlib.import_module("rosbags.highlevel").AnyReader([pathlib.Path(path)], default_typestore=store) as reader:
+    bags = importlib.import_module("rosbags.highlevel")
+    with bags.AnyReader([pathlib.Path(path)], default_typestore=store) as reader:
         chosen = [connection for connection in reader.connections
                   if wanted(connection.topic, connection.msgtype)]
         messages: Iterator[Any] = reader.messages(chosen) if chosen else iter(())
         for connection, time, data in messages:
             topics.add(connection.topic, connection.msgtype, time,
-                       lambda: reader.deserialize(data, connection.msgtype))
+                       functools.partial(reader.deserialize, data, connection.msgtype))
 
 
 def read_bag(path: str, topics: Sequence[str] | None, types: Sequence[str] | None) -> (

@@ -10,16 +10,15 @@ import numbers
 import os
 import re
 import warnings
-from collections.abc import Mapping
-from typing import Any, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
 from ._core import Error
-from ._results import (Array, ComplexArray, IntArray, Result, TextArray, stack, table, to_gain,
-                       to_numbers, to_vector)
+from ._results import Array, ComplexArray, IntArray, Result, TextArray, stack, table, to_gain, to_numbers, to_vector
 from ._robot import is_cartesian, is_tool, selected
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import warnings
-from typing import Any, Dict, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,7 +47,7 @@ class LoggedMode(Result):
     """k x n, eigenvector of the first eigenvalue."""
 
 
-class Log(Dict[str, Dict[str, npt.NDArray[Any]]]):
+class Log(dict[str, dict[str, npt.NDArray[Any]]]):
     """The channels (topics) of a log, each a dict of field to array."""
 
     def __repr__(self) -> str:

@@ -7,7 +7,8 @@ import importlib
 import json
 import os
 import warnings
-from typing import Any, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -391,9 +392,10 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     a pose of the tip, with `task_stiffness` K_C and `task_damping` C_C (6 x 6, in the axes of
     `frame`, base or tool). In the motions that the selected `directions` leave free act
     `null_stiffness` and `null_damping` (n each). A damping ratio above 0 has the damping designed
-    for it; the robot's viscous friction comes on top, and moves the ratios. The springs hold an `external_wrench` (6, of the world on the tip, in
-    the base's axes) at q; `load` says how it moves with the arm, which adds stiffness: base_wrench,
-    tool_wrench (it turns with the tip), joint_torques (its joint torques are constant).
+    for it; the robot's viscous friction comes on top, and moves the ratios. The springs hold an
+    `external_wrench` (6, of the world on the tip, in the base's axes) at q; `load` says how it moves
+    with the arm, which adds stiffness: base_wrench, tool_wrench (it turns with the tip),
+    joint_torques (its joint torques are constant).
 
     Raises Error for a posture outside the position limits, gains that the controller would refuse,
     and springs with no damping or two.

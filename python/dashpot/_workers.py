@@ -7,7 +7,8 @@ import contextlib
 import functools
 import os
 import pickle
-from typing import Any, Callable, ContextManager, Iterator
+from collections.abc import Iterator
+from typing import Any, Callable
 
 from . import _core
 from ._results import Array
@@ -50,7 +51,7 @@ def _task_of(arguments: bytes) -> Task:
 
 
 def workers(executor: concurrent.futures.Executor | None
-            ) -> ContextManager[concurrent.futures.Executor]:
+            ) -> contextlib.AbstractContextManager[concurrent.futures.Executor]:
     """Returns the executor, which is left as it is, or one of threads, which ends with the context."""
     if executor is None:
         return concurrent.futures.ThreadPoolExecutor(os.cpu_count())

@@ -17,15 +17,16 @@ import statistics
 import sys
 import threading
 import time
-from collections.abc import Mapping
-from typing import Any, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ._controller import Controller, Ending, Setpoint, Status
 from ._core import Error
-from ._libfranka import (MODES, Answers, RobotStopped, Wire, advice, check_loop, exceptions,
-                         is_realtime, open_files, undisturbed)
+
+from ._libfranka import (  # isort: skip
+    MODES, Answers, RobotStopped, Wire, advice, check_loop, exceptions, is_realtime, open_files, undisturbed)
 
 WATCH = 0.3  # s of states before the start
 FADE = 0.2  # s from a stop to no torque, at least

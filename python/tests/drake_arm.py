@@ -5,8 +5,9 @@ import time
 import numpy as np
 from drake import lcmt_iiwa_command, lcmt_iiwa_status, lcmt_panda_command, lcmt_panda_status
 from pydrake.lcm import DrakeLcm
-from pydrake.manipulation import (IiwaCommandReceiver, IiwaControlMode, IiwaStatusSender,
-                                  PandaCommandReceiver, PandaControlMode, PandaStatusSender)
+
+from pydrake.manipulation import (  # isort: skip
+    IiwaCommandReceiver, IiwaControlMode, IiwaStatusSender, PandaCommandReceiver, PandaControlMode, PandaStatusSender)
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator

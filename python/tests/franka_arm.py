@@ -10,8 +10,7 @@ import time
 
 import franky_sim
 from franky_sim import simulation_server
-from franky_sim.franka_robot_protocol import (BaseCommand, MoveStatus, RobotCommand, RobotMode,
-                                               UDPCommand)
+from franky_sim.franka_robot_protocol import BaseCommand, MoveStatus, RobotCommand, RobotMode, UDPCommand
 from franky_sim.mujoco_simulator import MujocoSimulator
 
 # The errors that the tests use, by their places in the robot's state.

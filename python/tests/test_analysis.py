@@ -154,8 +154,8 @@ def test_responses_are_those_of_the_matrix_exponential():
     A = np.block([[np.zeros((5, 5)), np.eye(5)],
                   [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
     rest = np.linalg.solve(K, force)
-    for i, time in enumerate(times):
-        flow = scipy.linalg.expm(A * time)
+    for i, t in enumerate(times):
+        flow = scipy.linalg.expm(A * t)
         expected = flow @ np.concatenate([q, qd])
         np.testing.assert_allclose(free.position[i], expected[:5], atol=1e-10)
         np.testing.assert_allclose(free.velocity[i], expected[5:], atol=1e-9)

@@ -112,7 +112,7 @@ class Record:
     """What moved it from each sample to the next, N m along one direction."""
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def decay(seed):
     """1.5 s after a release; modes with 5 % of its energy or more count."""
     rng = np.random.default_rng([1, seed])
@@ -126,7 +126,7 @@ def decay(seed):
     return Record(0.001, 0.001 * np.arange(1500), y, arm.true[np.array(shares) >= 0.05], arm.true)
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def ambient(seed):
     """Two minutes under white torques; all modes count."""
     rng = np.random.default_rng([2, seed])
@@ -136,7 +136,7 @@ def ambient(seed):
     return Record(0.002, 0.002 * np.arange(60000), y, arm.true, arm.true)
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def excited(seed):
     """A chirp of torques, 0.3 to 12 Hz in 10 s, which moves the arm by about 0.02 rad, and 2 s in
     which its motion ends; modes below 10 Hz count whose resonance has 5 % of the highest one's
@@ -335,7 +335,7 @@ def timed(code, *arguments, **settings):
     return values, time.process_time() - begin
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def ours(kind, seed):
     return timed(of_dashpot, RECORDS[kind](seed), kind)
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import dashpot
-
 import models_sweep
 
 # Two joints in one body, anchors, references, a slide, a turned base, and bodies off the chain.
@@ -30,7 +29,8 @@ MJCF = """
     <joint name="three" type="slide" axis="1 0.5 0" ref="0.1" range="-0.2 0.5" armature="0.9"/>
     <geom type="box" size="0.1 0.05 0.07" pos="0.02 0.03 0.04" mass="1.2"/>
     <body name="tip" pos="0.1 0.02 0.2" euler="1 0.4 0.2"><joint name="four" axis="1 0 0" damping="0.1"/>
-     <geom type="box" size="0.02 0.05 0.03" mass="0.3"/><site name="tool" pos="0.1 0 0.05" euler="0 1.5707963267948966 0.3"/>
+     <geom type="box" size="0.02 0.05 0.03" mass="0.3"/>
+     <site name="tool" pos="0.1 0 0.05" euler="0 1.5707963267948966 0.3"/>
     </body></body></body></body></body></worldbody>
 <actuator><motor joint="one" gear="20" ctrlrange="-2 2"/><position joint="three" kp="100"/>
  <motor joint="four" forcerange="-5 5"/></actuator></mujoco>"""

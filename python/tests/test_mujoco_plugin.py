@@ -209,7 +209,7 @@ def test_an_arm_that_needs_its_brakes_is_named_once(tmp_path, capfd):
     ({"release": "1x"}, "'1x' is no index of userdata"),
     ({"lcm_url": "nonsense"}, "nonsense")])
 def test_what_does_not_fit_is_refused(attributes, reason, tmp_path, capfd):
-    with pytest.raises(Exception):
+    with pytest.raises(Exception):  # noqa: B017  # of MuJoCo, whose kind is not said
         model_of(tmp_path, sensor=False, **attributes)
     assert reason in capfd.readouterr().err
 

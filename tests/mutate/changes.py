@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 
 from clang.cindex import CursorKind as Kind
-from clang.cindex import Index, TranslationUnit
+from clang.cindex import Index
 
 # What an operator becomes, and what that change is called.
 SWAPS = {

@@ -15,8 +15,7 @@ import re
 from concurrent.futures import ThreadPoolExecutor
 
 import judge
-from building import (BUILD, ROOT, SOURCE, SUITES, WORK, build_changed, configure, suites_of,
-                      units_of)
+from building import BUILD, ROOT, SOURCE, SUITES, WORK, build_changed, configure, suites_of, units_of
 from changes import find, one_line
 from rewrite import copy_tree
 

@@ -101,7 +101,7 @@ class Page(PageTest):
         for _ in range(5):
             self.browser.value("document.getElementById('faster').click()")
         self.browser.until("document.getElementById('play').textContent == 'Play'")
-        self.browser.until('dashpot.frame.modes.tick == %d' % self.last_tick())
+        self.browser.until(f'dashpot.frame.modes.tick == {self.last_tick()}')
         re, im = poles(200, 4)
         self.await_poles(re, im)
         self.await_frequency(re, im)
@@ -157,7 +157,7 @@ class Page(PageTest):
             site.stop()
 
     def test_draws_every_arm_that_it_may_get(self):
-        for name, joints in (('panda', 7), ('ur5', 6)):
+        for name in ('panda', 'ur5'):
             scene = os.path.join(SOURCE, 'sim/scenes', name + '.yaml')
             log = os.path.join(FOLDER, name + '.lcm')
             run('run', scene, '--fast', '--duration', '0.2', '--log', log)
