@@ -93,9 +93,9 @@ class Browser:
         self.call('Page.navigate', url=url)
 
     def value(self, expression):
-        """Returns the JSON value of a JavaScript expression, which may be a promise."""
-        answer = self.call('Runtime.evaluate', expression=expression, returnByValue=True,
-                           awaitPromise=True)
+        """Returns the JSON value of a JavaScript expression, which may be a promise. $ finds an element, $$ a list."""
+        answer = self.call('Runtime.evaluate', expression=expression, returnByValue=True, awaitPromise=True,
+                           includeCommandLineAPI=True)
         if 'exceptionDetails' in answer:
             raise RuntimeError(str(answer['exceptionDetails']))
         return answer['result'].get('value')

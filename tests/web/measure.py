@@ -66,14 +66,14 @@ def page_cost():
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     with browser.Browser() as one:
         one.open(page)
-        one.until("document.querySelectorAll('#chips button').length > 5")
+        one.until("$$('#chips button').length > 5")
         for name in ('a loop', 'a loop and a mode that swings'):
             time.sleep(10)
             before, then = computing_time(one.process.pid), time.monotonic()
             time.sleep(20)
             share = (computing_time(one.process.pid) - before) / (time.monotonic() - then)
             print(f'the page of {name}: {100 * share:.1f} % of a core', flush=True)
-            one.value("document.querySelector('#chips button').click()")
+            one.value("$('#chips button').click()")
     for process in (running, server):
         process.terminate()
         process.wait()

@@ -55,7 +55,7 @@ class Page(PageTest):
         """The cells of the table, once it shows the natural frequency of this pole."""
         def shown():
             cells = self.browser.value(
-                "[...document.querySelectorAll('#rows td')].map((c) => c.textContent)")
+                "$$('#rows td').map((c) => c.textContent)")
             self.assertEqual(float(cells[1]), float(f'{math.hypot(re, im):.4g}'))
             return cells
         return self.browser.eventually(shown)
@@ -76,15 +76,15 @@ class Page(PageTest):
             self.assertEqual(y > 0, pole['im'] > 0)
             if y < 0:
                 continue  # the lower half is not drawn
-            pixel = self.browser.value(f'''(() => {{ const c = document.getElementById('poles');
+            pixel = self.browser.value(f'''(() => {{ const c = $('#poles');
                 const s = c.width / c.clientWidth; return [...c.getContext('2d').getImageData(
                 {pole['x']} * s, {pole['y']} * s, 1, 1).data]; }})()''')
             self.assertEqual(pixel, [0x00, 0x72, 0xb2, 255])
         cells = self.await_frequency(re, im)
         self.assertEqual(float(cells[3]), round(-re / math.hypot(re, im), 3))
         # The response, as the one-line formula has it.
-        self.browser.value("(document.getElementById('place').value = 'joint/0', "
-                           "document.getElementById('place').dispatchEvent(new Event('change')))")
+        self.browser.value("($('#place').value = 'joint/0', "
+                           "$('#place').dispatchEvent(new Event('change')))")
         self.browser.until("dashpot.response && dashpot.response.unit == 'rad/(N m)'")
         self.browser.until("dashpot.response.magnitude[0] > 0.0199")
         response = self.browser.value('dashpot.response')
@@ -99,8 +99,8 @@ class Page(PageTest):
         site = Site('--log', self.log)
         self.open(site)
         for _ in range(5):
-            self.browser.value("document.getElementById('faster').click()")
-        self.browser.until("document.getElementById('play').textContent == 'Play'")
+            self.browser.value("$('#faster').click()")
+        self.browser.until("$('#play').textContent == 'Play'")
         self.browser.until(f'dashpot.frame.modes.tick == {self.last_tick()}')
         re, im = poles(200, 4)
         self.await_poles(re, im)
@@ -108,11 +108,11 @@ class Page(PageTest):
         said = run('monitor', '--log', self.log)
         self.assertIn(f'{math.hypot(re, im):.4g}', said)
         for t, stiffness in (1, 50), (5, 200):  # what the curve tells under the pointer
-            self.browser.value(f'''(() => {{ const c = document.getElementById('frequency'), box = c.getBoundingClientRect();
-                c.dispatchEvent(new PointerEvent('pointermove', {{clientX: box.left + 54 + (c.clientWidth - 66) * {t} / 6,
-                clientY: box.top + 50}})); }})()''')
+            self.browser.value(f'''(() => {{ const c = $('#frequency'), box = c.getBoundingClientRect();
+                const clientX = box.left + 54 + (c.clientWidth - 66) * {t} / 6, clientY = box.top + 50;
+                c.dispatchEvent(new PointerEvent('pointermove', {{clientX, clientY}})); }})()''')
             told = f'{math.sqrt(stiffness / INERTIA):.2f}'
-            self.browser.until(f"document.querySelector('.hint')?.innerText.includes('mode 1: {told}')")
+            self.browser.until(f"$('.hint')?.innerText.includes('mode 1: {told}')")
         self.browser.value('dashpot.seek(1)')  # and back in time
         re, im = poles(50, 4)
         self.browser.until(f'dashpot.poles.length == 2 && Math.abs(Math.abs(dashpot.poles[0].im) - {im}) < 1e-6')
@@ -128,8 +128,8 @@ class Page(PageTest):
         url = f'udpm://239.255.76.67:{20000 + os.getpid() % 30000}?ttl=0'
         site = Site('--lcm-url', url, '--config', self.scene)
         self.browser.open(site.url)
-        self.browser.until("document.getElementById('link')?.textContent.includes('connected')")
-        self.browser.until("document.getElementById('link')?.textContent.includes('waiting')")
+        self.browser.until("$('#link')?.textContent.includes('connected')")
+        self.browser.until("$('#link')?.textContent.includes('waiting')")
         loop = subprocess.Popen([PROGRAM, 'run', self.scene, '--lcm-url', url], stdout=subprocess.DEVNULL,
                                 stderr=subprocess.DEVNULL)
         try:
@@ -142,13 +142,13 @@ class Page(PageTest):
                 self.browser.until(f'dashpot.poles.length == 2 && '
                                    f'Math.abs(Math.abs(dashpot.poles[0].im) - {im}) < 1e-6')
                 self.await_poles(re, im)
-            self.browser.until("document.getElementById('response_note').textContent.includes('others')")
+            self.browser.until("$('#response_note').textContent.includes('others')")
             site.stop()
-            self.browser.until("document.getElementById('link')?.textContent.includes('lost') || "
-                               "document.getElementById('link')?.textContent.includes('no connection')")
+            self.browser.until("$('#link')?.textContent.includes('lost') || "
+                               "$('#link')?.textContent.includes('no connection')")
             site.start()
             before = self.browser.value('dashpot.frames')
-            self.browser.until("document.getElementById('link')?.textContent == 'connected' && "
+            self.browser.until("$('#link')?.textContent == 'connected' && "
                                f'dashpot.frames > {before + 30}')
             self.await_poles(re, im)
         finally:
@@ -167,9 +167,9 @@ class Page(PageTest):
             # The page's kinematics and the program's agree on the tip.
             self.browser.until('dashpot.frame.utime == 100000 && dashpot.tip && dashpot.frame.state.tip_position'
                                '.every((x, k) => Math.abs(x - dashpot.tip[k][3]) < 1e-9)')
-            self.assertGreaterEqual(self.browser.value("document.querySelectorAll('#chips button').length"), 6)
-            self.browser.value("document.querySelectorAll('#chips button')[0].click()")
-            self.browser.until("document.querySelector('#chips button').getAttribute('aria-pressed') == 'true'")
+            self.assertGreaterEqual(self.browser.value("$$('#chips button').length"), 6)
+            self.browser.value("$$('#chips button')[0].click()")
+            self.browser.until("$('#chips button').getAttribute('aria-pressed') == 'true'")
             self.browser.size(390, 800, 2, True)
             self.assertLessEqual(self.browser.value('document.documentElement.scrollWidth'), 390)
             self.browser.size(1400, 1000)

@@ -44,7 +44,8 @@ def postures(host, setup, design):
     connection = http.client.HTTPConnection(host)
     began = time.perf_counter()
     for part in range(20):
-        connection.request('POST', '/workspace', json.dumps({'design': design, 'seed': 1, 'first': 100 * part, 'count': 100}),
+        connection.request('POST', '/workspace',
+                           json.dumps({'design': design, 'seed': 1, 'first': 100 * part, 'count': 100}),
                            {'Content-Type': 'application/json', 'X-Dashpot-Token': setup['token']})
         connection.getresponse().read()
     return 1e3 * (time.perf_counter() - began)
@@ -53,7 +54,8 @@ def postures(host, setup, design):
 process = subprocess.Popen([program, 'tune', '--port', '0'], stdout=subprocess.PIPE, text=True, cwd=source)
 try:
     url = process.stdout.readline().split()[0]
-    print('processes that want to run:', ' '.join(f'{load:.1f}' for load in os.getloadavg()), f'on {os.cpu_count()} cores')
+    print('processes that want to run:', ' '.join(f'{load:.1f}' for load in os.getloadavg()),
+          f'on {os.cpu_count()} cores')
     connection = http.client.HTTPConnection(url.split('/')[2])
     connection.request('GET', '/setup')
     setup = json.loads(connection.getresponse().read())
@@ -61,7 +63,8 @@ try:
     for name, design in (('factor 2', base | {'damping': {'factor': 2}}), ('ratio 0.7', base)):
         before = processor_time()
         fastest = min(postures(url.split('/')[2], setup, design) for _ in range(5))
-        print(f'2000 postures, {name}: {fastest:.0f} ms, fastest of 5, and {(processor_time() - before) / 5:.0f} ms of processors')
+        each = (processor_time() - before) / 5
+        print(f'2000 postures, {name}: {fastest:.0f} ms, fastest of 5, and {each:.0f} ms of processors')
     connection = http.client.HTTPConnection(url.split('/')[2])
     before = processor_time()
     for _ in range(50):
@@ -74,10 +77,12 @@ try:
         page.until(tune_walk.CURRENT)
         page.value('dashpot.store.edit((state) => { state.a.damping = {factor: 2}; }, true)')
         page.until('dashpot.workspace.found.a.postures >= 2000 && dashpot.workspace.found.b.postures >= 2000', 120)
-        print('on the page: ' + ', '.join(f'{name} {page.value(f"dashpot.workspace.found.{key}.took"):.0f} ms' for key, name in (('a', 'factor 2'), ('b', 'ratio 0.7'))))
+        print('on the page: ' + ', '.join(f'{name} {page.value(f"dashpot.workspace.found.{key}.took"):.0f} ms' for key,
+                                          name in (('a', 'factor 2'), ('b', 'ratio 0.7'))))
         for name, slider in (('posture', '#posture input[type=range]'), ('stiffness', '#gains input[type=range]')):
             found = page.value(MOVE % (moves, slider))
-            print(f'slider of {name}: {found[0]:.0f} ms at least, {found[len(found) // 2]:.0f} ms median, {found[int(.9 * len(found))]:.0f} ms at 90 %')
+            least, median, most = found[0], found[len(found) // 2], found[int(.9 * len(found))]
+            print(f'slider of {name}: {least:.0f} ms at least, {median:.0f} ms median, {most:.0f} ms at 90 %')
 finally:
     process.send_signal(signal.SIGINT)
     process.wait()

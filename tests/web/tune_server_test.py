@@ -39,7 +39,8 @@ class Server:
 
     def post(self, path, document, **headers):
         told = {'Content-Type': 'application/json', 'X-Dashpot-Token': self.setup['token']} | headers
-        status, body = self.ask('POST', path, document if isinstance(document, (str, bytes)) else json.dumps(document), **told)
+        status, body = self.ask('POST', path, document if isinstance(document, (str, bytes)) else json.dumps(document),
+                                **told)
         try:
             return status, json.loads(body)
         except ValueError:
@@ -75,7 +76,8 @@ class TuneServer(unittest.TestCase):
 
     def audit(self, *options):
         friction = ','.join(map(str, self.server.setup['model']['viscous_friction']))
-        return run('audit', *PANDA, '--q', ','.join(map(str, self.q)), '--viscous-friction', friction, '--json', *options)
+        return run('audit', *PANDA, '--q', ','.join(map(str, self.q)), '--viscous-friction', friction, '--json',
+                   *options)
 
     def test_numbers_are_those_of_an_audit(self):
         seed = random.randrange(1 << 30)
@@ -97,7 +99,8 @@ class TuneServer(unittest.TestCase):
         for damping in ({'factor': 2}, {'ratio': 0.7}, [30, 30, 30, 9, 9, 9]):
             for frame in ('base', 'tool'):
                 found = self.server.design(self.base | {'damping': damping, 'frame': frame})
-                self.same_modes(found['modes'], run('analyze', '-', '--json', text=json.dumps(found['system']))['modes'], 7)
+                self.same_modes(found['modes'],
+                                run('analyze', '-', '--json', text=json.dumps(found['system']))['modes'], 7)
 
     def test_motion_is_that_of_analyze(self):
         found = self.server.design(self.base, place='joint/3')
@@ -139,7 +142,8 @@ class TuneServer(unittest.TestCase):
                 row = row + [0] * (n - 7)
                 for k in (0, 80, 160):
                     s = 1j * f['omega'][k]
-                    A = [[s * s * system['mass'][i][j] + s * system['damping'][i][j] + system['stiffness'][i][j] for j in range(n)] for i in range(n)]
+                    M, C, K = (system[key] for key in ('mass', 'damping', 'stiffness'))
+                    A = [[s * s * M[i][j] + s * C[i][j] + K[i][j] for j in range(n)] for i in range(n)]
                     told = abs(sum(a * x for a, x in zip(row, solve(A, row))))
                     self.assertAlmostEqual(f['magnitude'][k], told, delta=1e-7 * told, msg=(place, k))
 
@@ -147,19 +151,23 @@ class TuneServer(unittest.TestCase):
         friction = self.base | {'damping': {'ratio': 0.7}, 'gain_margin': 1, 'arm': {'viscous_friction': [0] * 7}}
         for mode in self.server.design(friction)['modes']:
             self.assertAlmostEqual(mode['damping_ratio'], 0.7, places=5)
-        hard = self.server.design(friction | {'gain_margin': 2, 'period': 0.01, 'delay': 3, 'stiffness': [3000] * 3 + [300] * 3})
+        hard = self.server.design(friction | {'gain_margin': 2, 'period': 0.01, 'delay': 3,
+                                              'stiffness': [3000] * 3 + [300] * 3})
         self.assertLess(hard['smallest_ratio'], 0.65)  # lowered to what this loop bears
 
     def test_level_of_a_ratio_is_that_of_a_run(self):
         folder = tempfile.mkdtemp(prefix='dashpot-tune-')
         self.addCleanup(shutil.rmtree, folder)
-        hard = self.base | {'damping': {'ratio': 0.7}, 'period': 0.004, 'delay': 2, 'cutoff': 100, 'difference_velocity': True, 'gain_margin': 1.2}
+        hard = self.base | {'damping': {'ratio': 0.7}, 'period': 0.004, 'delay': 2, 'cutoff': 100,
+                            'difference_velocity': True, 'gain_margin': 1.2}
         found = self.server.design(hard)
         path = os.path.join(folder, 'scene.yaml')
         with open(path, 'w') as file:
-            file.write(f'robot: {{urdf: {PANDA[1]}, base: panda_link0, tip: panda_hand_tcp}}\ncontrol: {{period: 4 ms, mode: cartesian}}\n'
-                       f'gains: {{task: {{stiffness: {self.base["stiffness"]}, damping_ratio: 0.7}}, null_space: {{stiffness: 0, damping: 0}}}}\n'
-                       'limits: {gain_margin: 1.2}\nanalysis: {sampled: {delay: 2, cutoff: 100, difference_velocity: true}}\n'
+            file.write(f'robot: {{urdf: {PANDA[1]}, base: panda_link0, tip: panda_hand_tcp}}\n'
+                       'control: {period: 4 ms, mode: cartesian}\n'
+                       f'gains: {{task: {{stiffness: {self.base["stiffness"]}, damping_ratio: 0.7}}, '
+                       'null_space: {stiffness: 0, damping: 0}}\nlimits: {gain_margin: 1.2}\n'
+                       'analysis: {sampled: {delay: 2, cutoff: 100, difference_velocity: true}}\n'
                        f'scenario: {{duration: 40 ms, start: {{position: {self.q}}}}}\n')
         told = run('run', path, '--fast', '--json')
         self.same_modes(found['modes'], told['modes']['start'], 6)
@@ -192,7 +200,8 @@ class TuneServer(unittest.TestCase):
             after = self.server.design(self.base | {'damping': changed})
             for k, (a, b) in enumerate(zip(before['modes'], after['modes'])):
                 told = before['sensitivity']['damping'][k][i][j] * (1 if i == j else 2)
-                self.assertAlmostEqual((b['damping_ratio'] - a['damping_ratio']) / step, told, delta=1e-4 * max(1, abs(told)))
+                self.assertAlmostEqual((b['damping_ratio'] - a['damping_ratio']) / step, told,
+                                       delta=1e-4 * max(1, abs(told)))
 
     def test_sensitivities_know_gears(self):
         gears = {'reflected_inertia': [0.1] * 7, 'gear_stiffness': [5000, None] + [5000] * 5, 'gear_damping': [1] * 7}
@@ -201,7 +210,8 @@ class TuneServer(unittest.TestCase):
                 names = ('joint_stiffness', 'joint_damping') if of_joints else ('stiffness', 'damping')
                 design = self.base | {'arm': gears | {'position_sensor': sensor}, 'gain_margin': 1}
                 if of_joints:
-                    design |= {'mode': 'joint', 'joint_stiffness': [60, 50, 40, 40, 30, 20, 10], 'joint_damping': {'ratio': 0.6}}
+                    design |= {'mode': 'joint', 'joint_stiffness': [60, 50, 40, 40, 30, 20, 10],
+                               'joint_damping': {'ratio': 0.6}}
                 else:
                     design |= {'damping': {'ratio': 0.6}}
                 # The matrix of a ratio gives the same modes.
@@ -222,12 +232,15 @@ class TuneServer(unittest.TestCase):
                             if a['damping_ratio'] is None or b['damping_ratio'] is None or a['natural_frequency'] > 300:
                                 continue
                             told = before['sensitivity'][which][k][i][j] * (1 if i == j else 2) * step
-                            self.assertAlmostEqual(b['damping_ratio'] - a['damping_ratio'], told, delta=1e-3 * abs(told) + 1e-9, msg=(sensor, which, i, j, k))
+                            self.assertAlmostEqual(b['damping_ratio'] - a['damping_ratio'], told,
+                                                   delta=1e-3 * abs(told) + 1e-9, msg=(sensor, which, i, j, k))
 
     def test_arm_has_rotors_payload_gears(self):
-        parts = {'reflected_inertia': [0.1] * 7, 'payload': {'mass': 2, 'center': [0, 0, 0.1]}, 'gear_stiffness': [5000] * 7}
+        parts = {'reflected_inertia': [0.1] * 7, 'payload': {'mass': 2, 'center': [0, 0, 0.1]},
+                 'gear_stiffness': [5000] * 7}
         found = self.server.design(self.base | {'arm': parts})
-        posture = self.audit('--preset', 'cartesian_impedance_controller', '--reflected-inertia', '0.1', '--payload', '2,0,0,0.1',
+        posture = self.audit('--preset', 'cartesian_impedance_controller', '--reflected-inertia', '0.1', '--payload',
+                             '2,0,0,0.1',
                              '--gear-stiffness', '5000', '--period', '0.001')['posture']
         self.same_modes(found['modes'], posture['modes'], 7)
         self.assertEqual(len(found['modes']), 13)
@@ -245,7 +258,8 @@ class TuneServer(unittest.TestCase):
         self.assertEqual(keys(self.base | {'gain_margin': 1}), [])
         self.assertEqual(keys(self.base | {'damping': [-1, 1, 1, 1, 1, 1]}), ['task_damping'])
         self.assertEqual(keys(self.base | {'damping': [400] * 3 + [300] * 3}), ['gain_margin'])
-        status, answer = self.server.post('/design', {'q': self.q, 'place': 'tip/0', 'design': self.base | {'stiffness': [-1] * 6}})
+        status, answer = self.server.post('/design', {'q': self.q, 'place': 'tip/0',
+                                                      'design': self.base | {'stiffness': [-1] * 6}})
         self.assertEqual((status, 'task_stiffness' in answer['error']), (400, True))
 
     def test_workspace_is_that_of_an_audit(self):
@@ -260,15 +274,18 @@ class TuneServer(unittest.TestCase):
         for key, values in found.items():
             self.assertAlmostEqual(min(values), told[key]['worst'], delta=1e-5 * abs(told[key]['worst']))
         # A design by ratio has the ratio everywhere.
-        status, part = self.server.post('/workspace', {'design': self.base | {'damping': {'ratio': 0.7}, 'gain_margin': 1,
+        status, part = self.server.post('/workspace',
+                                        {'design': self.base | {'damping': {'ratio': 0.7}, 'gain_margin': 1,
             'arm': {'viscous_friction': [0] * 7}}, 'seed': 5, 'first': 0, 'count': 30})
         self.assertEqual(status, 200)
         self.assertAlmostEqual(min(part['smallest_ratio']), 0.7, places=3)
-        self.assertAlmostEqual(self.server.design(self.base, part['worst']['gain_margin']['q'])['smallest_ratio'] > 0, True)
+        self.assertAlmostEqual(self.server.design(self.base, part['worst']['gain_margin']['q'])['smallest_ratio'] > 0,
+                               True)
 
     def test_workspace_gives_up_in_time(self):
         # Each of these postures takes tenths of a second; all of them would keep Ctrl-C waiting for minutes.
-        slow = self.base | {'delay': 20, 'cutoff': 100, 'difference_velocity': True, 'arm': {'reflected_inertia': [0.3] * 7, 'gear_stiffness': [1e4] * 7}}
+        slow = self.base | {'delay': 20, 'cutoff': 100, 'difference_velocity': True,
+                            'arm': {'reflected_inertia': [0.3] * 7, 'gear_stiffness': [1e4] * 7}}
         status, part = self.server.post('/workspace', {'design': slow, 'seed': 1, 'first': 0, 'count': 500})
         self.assertEqual(status, 200)
         self.assertLess(0, part['count'])
@@ -280,7 +297,8 @@ class TuneServer(unittest.TestCase):
     def test_payload_has_inertia(self):
         payload = {'mass': 2, 'center': [0, 0, 0.1], 'inertia': [[0.03, 0, 0.002], [0, 0.04, 0], [0.002, 0, 0.02]]}
         found = self.server.design(self.base | {'arm': {'payload': payload}})
-        posture = self.audit('--preset', 'cartesian_impedance_controller', '--payload', '2,0,0,0.1,0.03,0.04,0.02,0,0.002,0')['posture']
+        posture = self.audit('--preset', 'cartesian_impedance_controller', '--payload',
+                             '2,0,0,0.1,0.03,0.04,0.02,0,0.002,0')['posture']
         self.same_modes(found['modes'], posture['modes'], 7)
 
     def test_reads_a_configuration(self):
@@ -308,7 +326,8 @@ class TuneServer(unittest.TestCase):
             script = file.read().split('```sh\n')[1].split('```')[0]
         if not shutil.which('curl'):
             self.skipTest('no curl on this machine')
-        done = subprocess.run(['bash', '-c', script.replace('127.0.0.1:8025', self.server.host)], capture_output=True, text=True)
+        done = subprocess.run(['bash', '-c', script.replace('127.0.0.1:8025', self.server.host)], capture_output=True,
+                              text=True)
         answer = json.loads(done.stdout)
         self.assertEqual(len(answer['modes']), 6, answer)
         design = {'stiffness': [400] * 3 + [20] * 3, 'damping': {'ratio': 0.7}, 'arm': {'payload': {'mass': 1}}}
@@ -334,7 +353,8 @@ class TuneServer(unittest.TestCase):
             arm = ['--urdf', urdf, *PANDA[2:]]
             server = Server(*arm)
             self.addCleanup(server.stop)
-            for questions, stiffness, damping in ((1, [400] * 3 + [20] * 3, [40] * 3 + [2] * 3), (2, [400] * 3 + [20] * 3, [0.7] * 6),
+            for questions, stiffness, damping in ((1, [400] * 3 + [20] * 3, [40] * 3 + [2] * 3),
+                                                  (2, [400] * 3 + [20] * 3, [0.7] * 6),
                                                   (2, [20] * 3 + [400] * 3, [9] * 6)):
                 words = ['--stiffness', ','.join(map(str, stiffness)), '--damping', ','.join(map(str, damping))]
                 done = subprocess.run([PROGRAM, 'audit', *arm, *words], capture_output=True, text=True)
@@ -359,18 +379,24 @@ class TuneServer(unittest.TestCase):
         self.assertEqual((refused[0], refused[-1]), (405, b'GET and POST only\n'))
         for words in ('', '{', '[]', 'null', '7', '"a"', '{"design": 3}', '[' * 60000, '{"a":' * 9000, b'\xff\xfe'):
             self.assertEqual(post('/design', words)[0], 400, words[:20])
-        for change in ({'q': self.q[:-1]}, {'q': ['a'] * 7}, {'q': [1e300] * 7}, {'q': None}, {'place': 'tip/6'}, {'place': 'joint/7'},
+        for change in ({'q': self.q[:-1]}, {'q': ['a'] * 7}, {'q': [1e300] * 7}, {'q': None}, {'place': 'tip/6'},
+                       {'place': 'joint/7'},
                        {'place': 'tip/-1'}, {'place': 3}, {'q': '0 kg'}, {'design': self.base | {'evil': 1}},
-                       {'design': self.base | {'stiffness': [1] * 5}}, {'design': self.base | {'stiffness': [[1] * 6] * 5}},
-                       {'design': self.base | {'damping': {'ratio': 3}}}, {'design': self.base | {'damping': {'factor': 2, 'x': 1}}},
-                       {'design': self.base | {'delay': 21}}, {'design': self.base | {'delay': 1.5}}, {'design': self.base | {'period': -1}}, {'design': self.base | {'mode': 'x'}},
-                       {'design': self.base | {'arm': {'urdf': '/etc/passwd'}}}, {'design': self.base | {'arm': {'reflected_inertia': [-1] * 7}}},
+                       {'design': self.base | {'stiffness': [1] * 5}},
+                       {'design': self.base | {'stiffness': [[1] * 6] * 5}},
+                       {'design': self.base | {'damping': {'ratio': 3}}},
+                       {'design': self.base | {'damping': {'factor': 2, 'x': 1}}},
+                       {'design': self.base | {'delay': 21}}, {'design': self.base | {'delay': 1.5}},
+                       {'design': self.base | {'period': -1}}, {'design': self.base | {'mode': 'x'}},
+                       {'design': self.base | {'arm': {'urdf': '/etc/passwd'}}},
+                       {'design': self.base | {'arm': {'reflected_inertia': [-1] * 7}}},
                        {'design': self.base | {'arm': {'payload': {'mass': 1e9}}}}, {'design': self.base | {'arm': 3}}):
             status, answer = post('/design', good | change)
             self.assertEqual(status, 400, change)
             self.assertTrue(answer['error'])
         for change in ({'count': 501}, {'count': -1}, {'count': 1.5}, {'first': '0'}, {'seed': 1 << 40}):
-            self.assertEqual(post('/workspace', {'design': self.base, 'seed': 1, 'first': 0, 'count': 1} | change)[0], 400, change)
+            self.assertEqual(post('/workspace', {'design': self.base, 'seed': 1, 'first': 0, 'count': 1} | change)[0],
+                             400, change)
         # Of a body in chunks no length is known before.
         with socket.create_connection(self.server.host.split(':')) as chunks:
             chunks.sendall((f'POST /design HTTP/1.1\r\nHost: {self.server.host}\r\nX-Dashpot-Token: {token}\r\n'

@@ -21,13 +21,14 @@ def ratios(page):
 def begin(page):
     """Gives both designs the paper's stiffness, and design A the damping C_C0 = I."""
     page.value("""dashpot.store.edit((state) => { state.edited = "a"; state.a.damping = [1, 1, 1, 1, 1, 1];
-        for (const one of ["a", "b"]) state[one].stiffness = [3000, 3000, 3000, 100, 100, 100]; state.b.damping = {ratio: 0.7}; }, true)""")
+        for (const one of ["a", "b"]) state[one].stiffness = [3000, 3000, 3000, 100, 100, 100];
+        state.b.damping = {ratio: 0.7}; }, true)""")
     page.until(CURRENT)
 
 
 def click(page):
     """Clicks the arrow on the diagonal of the damping that raises the smallest ratio most."""
-    page.value("""(() => { const rows = [...document.querySelectorAll('#arrows_damping tr')].slice(1);
+    page.value("""(() => { const rows = $$('#arrows_damping tr').slice(1);
         const all = rows.map((row, i) => row.querySelectorAll('button')[i]).filter((b) => b.className == 'up');
         const size = (b) => Number(b.textContent.slice(1).replace('−', '-'));
         all.reduce((a, b) => size(b) > size(a) ? b : a).click(); })()""")
@@ -36,9 +37,11 @@ def click(page):
 
 def picture(page, path, first, last, scale):
     """Writes what is between the upper left end of one element and the lower right end of another."""
-    box = page.value(f'''(() => {{ const [a, b] = ['{first}', '{last}'].map((id) => document.getElementById(id).getBoundingClientRect());
+    box = page.value(f'''(() => {{
+        const [a, b] = ['{first}', '{last}'].map((id) => $('#' + id).getBoundingClientRect());
         return {{x: a.left + scrollX, y: a.top + scrollY, width: b.right - a.left, height: b.bottom - a.top}}; }})()''')
-    data = page.call('Page.captureScreenshot', format='png', captureBeyondViewport=True, clip=box | {'scale': scale})['data']
+    data = page.call('Page.captureScreenshot', format='png', captureBeyondViewport=True,
+                     clip=box | {'scale': scale})['data']
     with open(path, 'wb') as file:
         file.write(base64.b64decode(data))
 
