@@ -18,8 +18,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-constexpr double kFewest = 0.8;        // share of the parts that must have a mode
-constexpr double kLeastRatio = 0.001;  // of what decays
 /// Student's 95 % quantile for 20 parts over that of the normal distribution.
 constexpr double kStudent = 2.09 / 1.96;
 
@@ -119,11 +117,11 @@ MeasuredMode to_mode(const RealizedPole& pole,
     frequencies.push_back(modulus(nearest->eigenvalue));
     ratios.push_back(-nearest->eigenvalue.real() / frequencies.back());
   }
-  const auto parts = static_cast<double>(without.size());
-  if (static_cast<double>(frequencies.size()) < kFewest * parts) {
-    mode.reason = "not there without some parts of the record";
-    return mode;
-  }
+  Evidence evidence{
+      .mode = mode,
+      .parts = static_cast<double>(frequencies.size()) / static_cast<double>(without.size())};
+  weigh(Stage::kParts, evidence, mode);
+  if (!mode.reason.empty()) return mode;
   mode.natural_frequency_std = jackknife(frequencies);
   mode.damping_ratio_std =
       lambda.imag() == 0 ? std::numeric_limits<double>::infinity() : jackknife(ratios);
@@ -133,9 +131,7 @@ MeasuredMode to_mode(const RealizedPole& pole,
   }
   const double w = mode.natural_frequency_std / mode.natural_frequency, z = jackknife(ratios);
   mode.covariance = mode.natural_frequency * (std::pow(jackknife(sums), 2) - w * w - z * z) / 2;
-  if (mode.damping_ratio + 2 * mode.damping_ratio_std < kLeastRatio) {
-    mode.reason = "it does not decay: something moves at this frequency";
-  }
+  weigh(Stage::kParts, evidence, mode);
   return mode;
 }
 

@@ -22,6 +22,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
+/// Noise, of the sensors' rounding: what is left over is its steps. Estimates of it scatter so
+/// much.
+constexpr double kRounds = 1.2;
+
 /// The shape of a factor's first eigenvalue, from its amplitudes.
 VectorXcd shape_of(const DecayFactor& factor, const MatrixXd& amplitude) {
   if (!factor.pair) return amplitude.row(0).transpose().cast<Complex>();
@@ -149,49 +153,24 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   }
   if (search.larger) doubt_order(search.fit, *search.larger, modes);
   result.order = static_cast<int>(at);
-  // Friction makes of one mode others near it, heavily damped ones, and weak ones.
-  constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2, kMuch = 0.1, kOfRest = 0.3,
-                   kPoor = 0.01, kLittle = 1e-3, kRounds = 1.2;
-  double most = 0;
-  for (const MeasuredMode& mode : modes) {
-    if (mode.damping_ratio < kLightly) most = std::max(most, mode.energy);
-  }
-  // Of driven motion the noise of inputs is left over, too.
-  // Rounding is no noise, either, but of a known size.
-  const bool rounded = (search.fit.noise.array() <= kRounds * search.data.rounding.array()).all();
-  const double unexplained = 1 - result.explained;
-  const bool coloured = search.fit.whiteness > kFarFromWhite;
-  const bool doubted = coloured && !rounded && (search.data.inputs == 0 || unexplained > kMuch);
-  for (MeasuredMode& mode : modes) {
-    if (mode.stability > 0 && search.data.inputs == 0 && mode.energy < kOfRest * unexplained) {
-      mode.reason = "much weaker than what is left over";
-    } else if (mode.stability == 0 && mode.energy < unexplained) {
-      mode.reason = "weaker than what is left over, and in no model of another order";
-    } else if (mode.stability == 0 && (rounded ? coloured : unexplained > kPoor)) {
-      mode.not_linear = !rounded;
-      mode.reason = rounded ? "in no model of another order, and the sensors' steps are left over"
-                            : "in no model of another order, and much is left over";
-    }
-    // Several records that agree, of which hardly anything is left over, have it.
-    const bool agreed =
-        search.data.records > 1 && !search.differs && mode.stability > 0 && unexplained < kLittle;
-    if (doubted && !agreed && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
-      mode.not_linear = true;
-      mode.reason = std::string(search.differs        ? "parts of the records differ"
-                                : unexplained > kMuch ? "much is left over"
-                                                      : "what is left over is no noise") +
-                    ": it may be friction, or what else is not linear";
-    }
-  }
   for (const DecayFactor& factor : search.not_repeated) {
     MeasuredMode& mode = modes.emplace_back();
     mode.eigenvalues = factor.eigenvalues();
     mode.natural_frequency = factor.pair ? std::exp(factor.first) : std::abs(factor.first);
     mode.damping_ratio = factor.pair ? factor.second : 1;
     mode.shape = VectorXcd::Zero(search.data.channels);
-    mode.reason = "parts of the records have another, or none: not linear, or noise";
+    weigh(Stage::kNotRepeated, {mode}, mode);
   }
-  judge(std::move(modes), {duration, step, search.data.inputs == 0}, result);
+  const RecordFacts facts{
+      .duration = duration,
+      .step = step,
+      .kind = search.data.inputs == 0 ? MotionKind::kDecays : MotionKind::kDriven,
+      .records = search.data.records,
+      .whiteness = result.whiteness,
+      .unexplained = 1 - result.explained,
+      .rounded = (search.fit.noise.array() <= kRounds * search.data.rounding.array()).all(),
+      .differs = search.differs};
+  judge(std::move(modes), facts, result);
   return result;
 }
 

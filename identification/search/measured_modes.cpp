@@ -63,81 +63,14 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
   }
 }
 
-/// Relative deviations of what is not determined: of decays more, because those of one are widened.
-constexpr double kUndetermined = 0.05, kUndeterminedInDecays = 0.06;
-constexpr double kHarmonic = 3;  // of friction and other forces that are odd; sums tell even ones
-constexpr double kExplains = 5;  // energy, over a mode's: what is not linear is weaker than that
-constexpr double kMostEnergy = 100;     // energy of what cancels against others
-constexpr double kCoincides = 0.002;    // relative: what is not linear moves the larger modes, too
-constexpr double kLightlyDamped = 0.3;  // what lasts long enough to have harmonics
-
-/// Why a mode is not to be believed; empty if it is.
-std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all,
-                  const Judgement& records) {
-  const auto& lambda = mode.eigenvalues;
-  const double vague = records.decays ? kUndeterminedInDecays : kUndetermined;
-  if (lambda[0] == lambda[1] && lambda[0].imag() == 0) {
-    return "a decay without oscillation, whose partner the records do not show";
+/// The modes with the reasons that a stage finds; what it says of one changes nothing for others.
+std::vector<MeasuredMode> weighed(Stage stage, const std::vector<MeasuredMode>& modes,
+                                  const RecordFacts& records) {
+  std::vector<MeasuredMode> result = modes;
+  for (std::size_t k = 0; k < modes.size(); ++k) {
+    if (modes[k].reason.empty()) weigh(stage, {modes[k], modes, records}, result[k]);
   }
-  if (mode.energy > kMostEnergy) return "it cancels against others like it: neither is determined";
-  if (!(mode.natural_frequency_std < vague * mode.natural_frequency)) {
-    return "its frequency is not determined";
-  }
-  if (!(mode.damping_ratio_std < vague * std::max(1.0, mode.damping_ratio))) {
-    return "its damping ratio is not determined";
-  }
-  if (mode.natural_frequency * records.step > 2.5) return "too fast for the samples";
-  if (lambda[0].imag() * records.duration < 3 && lambda[0].imag() != 0 &&
-      -lambda[0].real() * records.duration < 1) {
-    return "too slow for the record";
-  }
-  // Other orders miss heavily damped modes, but no lightly damped one that is there.
-  const double enough = mode.damping_ratio < 0.1 ? 3e-3 : 1e-3;
-  if (mode.stability == 0 && mode.energy < enough) return "weak, and in no model of another order";
-  if (mode.energy < 1e-6) return "too weak to be told from what is not linear";
-  for (const MeasuredMode& other : all) {
-    if (other.energy > 2 * mode.energy && likeness(other.shape, mode.shape) > 0.8 &&
-        std::abs(other.eigenvalues[0] - lambda[0]) < 0.05 * std::abs(lambda[0])) {
-      return "like a larger mode next to it: its frequency changes with its size";
-    }
-  }
-  for (const MeasuredMode& other : all) {
-    if (&other == &mode || other.energy < mode.energy || !other.reason.empty()) continue;
-    const double deviation = std::hypot(mode.natural_frequency_std, other.natural_frequency_std);
-    if (std::abs(other.natural_frequency - mode.natural_frequency) < 4 * deviation &&
-        std::abs(other.eigenvalues[0] - lambda[0]) < 0.2 * std::abs(lambda[0]) &&
-        likeness(other.shape, mode.shape) > 0.8) {
-      return "the same as a larger mode next to it";
-    }
-  }
-  if (mode.damping_ratio + 2 * mode.damping_ratio_std < 0) return "it grows";
-  if (mode.damping_ratio <= (records.decays ? mode.damping_ratio_std : 0)) {
-    return "it does not decay within its deviation";
-  }
-  // Of modes that are known themselves.
-  const auto explains = [&mode](const MeasuredMode& other) {
-    return &other != &mode && other.energy > kExplains * mode.energy && other.energy < kMostEnergy;
-  };
-  const auto coincides = [&mode](double distance, double size) {
-    return distance < std::max(kCoincides * size, 2 * mode.natural_frequency_std);
-  };
-  for (const MeasuredMode& a : all) {
-    if (!explains(a)) continue;
-    const double multiple = kHarmonic * a.eigenvalues[0].imag();
-    if (multiple > 0 && mode.damping_ratio < kLightlyDamped &&
-        coincides(std::abs(lambda[0].imag() - multiple), multiple)) {
-      return "three times the frequency of a larger mode: not a mode, but what is not linear";
-    }
-    for (const MeasuredMode& b : all) {
-      if (!explains(b)) continue;
-      for (const Complex& other : {b.eigenvalues[0], b.eigenvalues[1]}) {
-        if (coincides(std::abs(a.eigenvalues[0] + other - lambda[0]), std::abs(lambda[0]))) {
-          return "the sum of two eigenvalues of larger modes: not a mode, but what is not linear";
-        }
-      }
-    }
-  }
-  return {};
+  return result;
 }
 
 }  // namespace
@@ -147,7 +80,7 @@ MeasuredMode to_mode(const SteadyLine& hum) {
   mode.eigenvalues = {Complex(0, hum.frequency), Complex(0, -hum.frequency)};
   mode.natural_frequency = hum.frequency;
   mode.shape = turned(hum.size);
-  mode.reason = "a steady hum, taken away";
+  weigh(Stage::kHum, {mode}, mode);
   return mode;
 }
 
@@ -185,32 +118,12 @@ double stability_of(const MeasuredMode& mode,
   return all > 0 ? static_cast<double>(having) / all : 0;
 }
 
-void judge(std::vector<MeasuredMode> modes, const Judgement& records, Identification& result) {
+void judge(std::vector<MeasuredMode> modes, const RecordFacts& records, Identification& result) {
+  if (records.kind != MotionKind::kAmbient) modes = weighed(Stage::kLeftOver, modes, records);
   pair_reals(modes);
-  for (const MeasuredMode& mode : modes) {
-    MeasuredMode judged = mode;
-    if (judged.reason.empty()) judged.reason = doubt(mode, modes, records);
-    (judged.reason.empty() ? result.modes : result.rejected).push_back(std::move(judged));
-  }
-  // A model of a decay that is not linear explains it to its noise, with modes that no model of
-  // another order has; that of a linear one has fewer of those than others, or all of it is
-  // believed. What moves driven and ambient motion is left over, and its colour tells.
-  const auto alone = std::stable_partition(result.modes.begin(), result.modes.end(),
-                                           [](const auto& mode) { return mode.stability > 0; });
-  const auto stable = static_cast<std::size_t>(alone - result.modes.begin());
-  constexpr double kWhite = 1.5, kCounts = 1e-3;  // energy of a rejected one
-  const bool whole = std::none_of(result.rejected.begin(), result.rejected.end(),
-                                  [](const auto& mode) { return mode.energy > kCounts; });
-  const bool coloured = result.whiteness > kWhite && result.rejected.size() > result.modes.size();
-  if (records.decays ? !whole && 2 * stable <= result.modes.size() : coloured) {
-    for (auto mode = alone; mode != result.modes.end(); ++mode) {
-      mode->not_linear = records.decays;
-      mode->reason = records.decays
-                         ? "in no model of another order, as half of this model or more"
-                         : "in no model of another order, and most of this one is not believed";
-      result.rejected.push_back(std::move(*mode));
-    }
-    result.modes.erase(alone, result.modes.end());
+  modes = weighed(Stage::kMode, modes, records);
+  for (MeasuredMode& mode : weighed(Stage::kTogether, modes, records)) {
+    (mode.reason.empty() ? result.modes : result.rejected).push_back(std::move(mode));
   }
   const auto slower = [](const MeasuredMode& a, const MeasuredMode& b) {
     return a.natural_frequency < b.natural_frequency;

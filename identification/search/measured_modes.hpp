@@ -2,6 +2,7 @@
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/model/realization.hpp>
 #include <dashpot/identification/records/steady_lines.hpp>
+#include <dashpot/identification/search/doubts.hpp>
 
 #include <vector>
 
@@ -23,14 +24,8 @@ std::vector<ModelPole> model_poles(const std::vector<std::vector<RealizedPole>>&
 double stability_of(const MeasuredMode& mode,
                     const std::vector<std::vector<RealizedPole>>& by_order, int order);
 
-/// The records that modes are judged by.
-struct Judgement {
-  double duration = 0, step = 0;  ///< s
-  bool decays = false;            ///< the motion is free, and modes fade
-};
-
 /// Makes overdamped modes of single eigenvalues of like shapes, and sorts out what is not to be
-/// believed, with reasons; those with a reason have one already.
-void judge(std::vector<MeasuredMode> modes, const Judgement& records, Identification& result);
+/// believed (doubts.hpp); modes with a reason are not, and have one already.
+void judge(std::vector<MeasuredMode> modes, const RecordFacts& records, Identification& result);
 
 }  // namespace dashpot::identification

@@ -52,8 +52,11 @@ MeasuredMode decay(double rate, double std) {
 Identification judged(const std::vector<MeasuredMode>& modes, double duration = 10,
                       double whiteness = 1, bool decays = false) {
   Identification result;
-  result.whiteness = whiteness;
-  judge(modes, {duration, 1e-3, decays}, result);
+  const RecordFacts records{.duration = duration,
+                            .step = 1e-3,
+                            .kind = decays ? MotionKind::kDecays : MotionKind::kAmbient,
+                            .whiteness = whiteness};
+  judge(modes, records, result);
   return result;
 }
 
