@@ -41,14 +41,14 @@ VectorXcd shape_of(const DecayFactor& factor, const MatrixXd& amplitude) {
   return ((c + s / safe) / 2).cast<Complex>();
 }
 
-MeasuredMode to_mode(const ModelSearch& search, std::size_t k, Index at, const VectorXd& scale,
+MeasuredMode to_mode(const FoundModel& found, std::size_t k, Index at, const VectorXd& scale,
                      double all) {
-  const DecayFit& fit = search.fit;
+  const DecayFit& fit = found.fit;
   const DecayFactor& factor = fit.factors[k];
   MeasuredMode mode;
   mode.eigenvalues = factor.eigenvalues();
   const std::array<double, 2> shown =
-      k < search.scatter.size() ? search.scatter[k] : std::array<double, 2>{};
+      k < found.scatter.size() ? found.scatter[k] : std::array<double, 2>{};
   const auto variance = [&](Index i) {
     const double more = i - at < 2 ? shown[static_cast<std::size_t>(i - at)] : 0;
     return std::sqrt(std::max(0.0, fit.covariance(i, i)) + std::max(0.0, more));
@@ -68,9 +68,9 @@ MeasuredMode to_mode(const ModelSearch& search, std::size_t k, Index at, const V
     mode.damping_ratio_std = std::numeric_limits<double>::infinity();
   }
   double energy = 0;
-  const std::vector<MatrixXd> motion = factor_motion(search.data, fit, k);
+  const std::vector<MatrixXd> motion = factor_motion(found.data, fit, k);
   for (std::size_t i = 0; i < motion.size(); ++i) {
-    const auto& channels = search.data.parts[i].channels;
+    const auto& channels = found.data.parts[i].channels;
     for (std::size_t c = 0; c < channels.size(); ++c) {
       energy += motion[i].col(static_cast<Index>(c)).squaredNorm() / scale[channels[c]];
     }
@@ -120,19 +120,19 @@ void check_order(const IdentifyOptions& options) {
              "max_order has to be within 0 and 60");
 }
 
-Identification describe(const ModelSearch& search, const std::vector<MotionRecord>& records) {
+Identification describe(const FoundModel& found, const std::vector<MotionRecord>& records) {
   Identification result;
-  result.noise = search.fit.noise;
-  result.whiteness = search.fit.whiteness;
-  result.poles = model_poles(search.by_order);
+  result.noise = found.fit.noise;
+  result.whiteness = found.fit.whiteness;
+  result.poles = model_poles(found.by_order);
 
   // The motion of each channel about its means, and what is left of it. Constants of the model
   // are no rests where a slow decay cancels against them.
-  VectorXd scale = VectorXd::Zero(search.data.channels), rest = scale;
-  const auto over = left_over(search.data, search.fit);
+  VectorXd scale = VectorXd::Zero(found.data.channels), rest = scale;
+  const auto over = left_over(found.data, found.fit);
   for (std::size_t k = 0; k < over.size(); ++k) {
-    for (std::size_t c = 0; c < search.data.parts[k].channels.size(); ++c) {
-      rest[search.data.parts[k].channels[c]] += over[k].col(static_cast<Index>(c)).squaredNorm();
+    for (std::size_t c = 0; c < found.data.parts[k].channels.size(); ++c) {
+      rest[found.data.parts[k].channels[c]] += over[k].col(static_cast<Index>(c)).squaredNorm();
     }
   }
   double duration = 0, step = std::numeric_limits<double>::infinity();
@@ -146,30 +146,30 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   result.explained = 1 - rest.cwiseQuotient(scale).mean();
   std::vector<MeasuredMode> modes;
   Index at = 0;
-  for (std::size_t k = 0; k < search.fit.factors.size(); ++k) {
-    modes.push_back(to_mode(search, k, at, scale, static_cast<double>(scale.size())));
-    modes.back().stability = stability_of(modes.back(), search.by_order, search.order);
-    at += search.fit.factors[k].parameters();
+  for (std::size_t k = 0; k < found.fit.factors.size(); ++k) {
+    modes.push_back(to_mode(found, k, at, scale, static_cast<double>(scale.size())));
+    modes.back().stability = stability_of(modes.back(), found.by_order, found.order);
+    at += found.fit.factors[k].parameters();
   }
-  if (search.larger) doubt_order(search.fit, *search.larger, modes);
+  if (found.larger) doubt_order(found.fit, *found.larger, modes);
   result.order = static_cast<int>(at);
-  for (const DecayFactor& factor : search.not_repeated) {
+  for (const DecayFactor& factor : found.not_repeated) {
     MeasuredMode& mode = modes.emplace_back();
     mode.eigenvalues = factor.eigenvalues();
     mode.natural_frequency = factor.pair ? std::exp(factor.first) : std::abs(factor.first);
     mode.damping_ratio = factor.pair ? factor.second : 1;
-    mode.shape = VectorXcd::Zero(search.data.channels);
+    mode.shape = VectorXcd::Zero(found.data.channels);
     weigh(Stage::kNotRepeated, {mode}, mode);
   }
   const RecordFacts facts{
       .duration = duration,
       .step = step,
-      .kind = search.data.inputs == 0 ? MotionKind::kDecays : MotionKind::kDriven,
-      .records = search.data.records,
+      .kind = found.data.inputs == 0 ? MotionKind::kDecays : MotionKind::kDriven,
+      .records = found.data.records,
       .whiteness = result.whiteness,
       .unexplained = 1 - result.explained,
-      .rounded = (search.fit.noise.array() <= kRounds * search.data.rounding.array()).all(),
-      .differs = search.differs};
+      .rounded = (found.fit.noise.array() <= kRounds * found.data.rounding.array()).all(),
+      .differs = found.differs};
   judge(std::move(modes), facts, result);
   return result;
 }
@@ -185,7 +185,7 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
   for (MotionRecord& record : moving.records) {
     for (SteadyLine& hum : take_hums(record)) hums.push_back(std::move(hum));
   }
-  Identification result = describe(ModelSearch(moving.records, options), moving.records);
+  Identification result = describe(find_model(moving.records, options), moving.records);
   for (const SteadyLine& hum : hums) result.rejected.push_back(to_mode(hum));
   return moving.of_all(std::move(result));
 }
@@ -205,16 +205,16 @@ Identification identify_excited(const std::vector<MotionRecord>& records,
   constexpr double kSearched = 3000, kLeast = 200;  // cells: the search is among the beginnings
   const double share =
       std::max(kSearched / static_cast<double>(count), kLeast / static_cast<double>(shortest));
-  if (share >= 1) return moving.of_all(describe(ModelSearch(cells, options), cells.records));
+  if (share >= 1) return moving.of_all(describe(find_model(cells, options), cells.records));
   std::vector<MotionRecord> beginnings;
   for (const MotionRecord& record : moving.records) {
     const auto samples = static_cast<double>(record.time.size());
     beginnings.push_back(part_of(record, 0, static_cast<Index>(share * samples)));
   }
   const ExcitedCells some(beginnings);
-  ModelSearch search(some, options);
-  search.refine(cells);
-  return moving.of_all(describe(search, cells.records));
+  FoundModel found = find_model(some, options);
+  refine(cells, found);
+  return moving.of_all(describe(found, cells.records));
 }
 
 }  // namespace dashpot::identification

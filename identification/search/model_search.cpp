@@ -1,14 +1,12 @@
 #include <dashpot/identification/model/common_denominator.hpp>
 #include <dashpot/identification/model/decay_columns.hpp>
 #include <dashpot/identification/records/check_that.hpp>
-#include <dashpot/identification/search/model_search.hpp>
+#include <dashpot/identification/records/decay_cells.hpp>
+#include <dashpot/identification/search/model_changes.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <string>
-#include <tuple>
 #include <utility>
 
 namespace dashpot::identification {
@@ -18,26 +16,26 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kRoughIterations = 4;  ///< of models of rising order: a first estimate
-constexpr int kProductIterations = 12;
+constexpr SearchLimits kOfDecays{.rows = 300, .worse = 6, .iterations = 30, .added = 6};
+/// Of models of rising order in a first estimate, which nothing is added to.
+constexpr SearchLimits kRough{.rows = 120, .worse = 3, .iterations = 4, .added = 0};
+/// A model of too small an order that has not settled loses to one of too large an order, whose
+/// surplus modes cancel. Decays that have cancel further with more; chirps need 60 iterations.
+constexpr SearchLimits kDriven{.rows = 0, .worse = 6, .iterations = 60, .added = 3};
+constexpr int kProductIterations = 12;  ///< from a start that is nearly right
+constexpr int kLastIterations = 30;     ///< on the samples as they are
 constexpr Index kSearchCells = 3000;
-/// A change of the model is given up where -2 log likelihood will stay larger by this. With 60,
-/// searches among heavily damped modes give up models that become the best ones.
-constexpr double kDifference = 300;
+constexpr std::size_t kMostSearched = 8;  ///< records
+constexpr std::size_t kWithProducts = 2;  ///< oscillations, of which the strongest products are
 /// In lengths of the record: a slower single decay is taken for drift, if one explains as much.
 constexpr double kDrifts = 3;
-
-/// Returns as factors the poles that a record of this length (s) can tell from a constant.
-std::vector<DecayFactor> factors_of(const std::vector<RealizedPole>& poles, double duration) {
-  std::vector<DecayFactor> factors;
-  for (const RealizedPole& pole : poles) {
-    if (modulus(pole.eigenvalue) * duration < 0.3 || pole.eigenvalue.real() * duration > 3)
-      continue;
-    factors.push_back(pole.eigenvalue.imag() > 0 ? DecayFactor::of_pair(pole.eigenvalue)
-                                                 : DecayFactor::of_single(pole.eigenvalue.real()));
-  }
-  return factors;
-}
+/// Orders: of decays two for each channel, within these; with inputs so many more, at most; and of
+/// decays at most so many for each cell and channel.
+constexpr Index kLeastOrder = 12, kMostOrder = 32, kOrdersOfInputs = 16, kCellsOfOrder = 4;
+constexpr int kOrdersOfRest = 2;  ///< what is left over is looked at for one motion at a time
+constexpr Index kRowsOfRest = 100, kColumnsOfRest = 10;  ///< of its Hankel matrix, most, and least
+constexpr int kSearchedOn = 4;       ///< factors more, for a model that is larger
+constexpr double kOrdersDone = 0.5;  ///< share of the search that is done then, for progress
 
 /// Poles of what is left over, of the whole and of the beginning, where fast decays are.
 std::vector<std::vector<RealizedPole>> rest_poles(const std::vector<MatrixXd>& rest, double step,
@@ -47,21 +45,28 @@ std::vector<std::vector<RealizedPole>> rest_poles(const std::vector<MatrixXd>& r
     std::vector<MatrixXd> beginning;
     for (const MatrixXd& record : rest) {
       const Index columns = record.cols() / part;
-      if (columns >= 10) beginning.emplace_back(record.leftCols(columns));
+      if (columns >= kColumnsOfRest) beginning.emplace_back(record.leftCols(columns));
     }
     if (beginning.empty()) continue;
-    const Realization realization(beginning, step, channels, 100);
-    for (int n = 1; n <= std::min(2, realization.max_order()); ++n) {
+    const Realization realization(beginning, step, channels, kRowsOfRest);
+    for (int n = 1; n <= std::min(kOrdersOfRest, realization.max_order()); ++n) {
       result.push_back(realization.poles(n));
     }
   }
   return result;
 }
 
+/// Poles with their shapes, from units of the noise to those of the channels.
+std::vector<RealizedPole> in_units_of(const VectorXd& noise, std::vector<RealizedPole> poles) {
+  for (RealizedPole& pole : poles) {
+    pole.shape = pole.shape.cwiseProduct(noise.cast<Complex>()).normalized();
+  }
+  return poles;
+}
+
 /// Adds the products of the strongest oscillations to a fit: an arm that moves far is not linear,
 /// and these products would be taken for modes.
 DecayFit with_products(const DecayData& data, const DecayFit& plain) {
-  constexpr std::size_t kStrongest = 2;
   std::vector<std::pair<double, std::size_t>> strongest;
   for (std::size_t k = 0; k < plain.factors.size(); ++k) {
     if (plain.factors[k].eigenvalues()[0].imag() == 0) continue;
@@ -69,7 +74,7 @@ DecayFit with_products(const DecayData& data, const DecayFit& plain) {
   }
   std::sort(strongest.rbegin(), strongest.rend());
   std::vector<DecayFactor> factors = plain.factors;
-  for (std::size_t i = 0; i < std::min(kStrongest, strongest.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(kWithProducts, strongest.size()); ++i) {
     factors[strongest[i].second].has_products = true;
   }
   return fit_decays(data, factors, plain.noise, kProductIterations);
@@ -79,8 +84,7 @@ DecayFit with_products(const DecayData& data, const DecayFit& plain) {
 /// are.
 std::vector<MotionRecord> strongest(const std::vector<MotionRecord>& records,
                                     const VectorXd& noise) {
-  constexpr std::size_t kMost = 8;
-  if (records.size() <= kMost) return records;
+  if (records.size() <= kMostSearched) return records;
   std::vector<std::pair<double, std::size_t>> motion;
   for (std::size_t r = 0; r < records.size(); ++r) {
     const DecayData alone({records[r]});
@@ -88,317 +92,191 @@ std::vector<MotionRecord> strongest(const std::vector<MotionRecord>& records,
   }
   std::sort(motion.begin(), motion.end());
   std::vector<MotionRecord> chosen;
-  for (std::size_t i = 0; i < kMost; ++i) chosen.push_back(records[motion[i].second]);
+  for (std::size_t i = 0; i < kMostSearched; ++i) chosen.push_back(records[motion[i].second]);
   return chosen;
 }
 
-}  // namespace
-
-ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOptions& options)
-    : data(all), stop_(options.stop) {
-  const int max_order = options.max_order;
-  const bool refine = options.refine;
-  VectorXd rounding;
-  const VectorXd noise = first_noise(all, &rounding);
-  const std::vector<MotionRecord> records = strongest(all, noise);
-  const DecayCells cells(records, noise, noise.cwiseMax(DecayData::kLinear * data.motion),
-                         refine ? kSearchCells : 0);
-  const Index channels = data.channels;
-  const Realization realization(cells.weighted(), cells.step, channels, refine ? 300 : 120);
-  const int wanted =
-      max_order > 0 ? max_order : static_cast<int>(std::clamp<Index>(2 * channels, 12, 32));
-  const int most = std::min(
-      {wanted, realization.max_order(), static_cast<int>(cells.shortest() * channels / 4)});
-  check_that(most >= 1, "nothing moves");
-  for (int n = 1; n <= most; ++n) {
-    by_order.push_back(realization.poles(n));
-    for (RealizedPole& pole :
-         by_order.back()) {  // from units of the noise to those of the channels
-      pole.shape = pole.shape.cwiseProduct(noise.cast<Complex>()).normalized();
-    }
-  }
-  cells_ = cells.records;
-  duration_ = cells.duration;
-  poles_of_rest_ = [step = cells.step, channels](const std::vector<MatrixXd>& rest) {
-    return rest_poles(rest, step, channels);
-  };
-  data = DecayData(cells_);
-  data.rounding = rounding;
-  rough_ = !refine;
-  if (rough_) iterations_ = kRoughIterations;
-  choose_order(cells.noise, false);
-  if (!refine) return;
-  improve();
-  if (factor_width(fit.factors) > 2 * channels) try_products(cells.noise);
-  try_drift();
-  keep_repeated();
-
-  const bool drifts = data.drifts();
-  data = DecayData(all);
-  data.rounding = rounding;
-  data.set_drifts(drifts);
-  if (all.size() > records.size()) {
-    for (DecayFactor& factor : fit.factors) factor.scale.clear();
-    larger.reset();
-  }
-  fit = fit_decays(data, fit.factors, fit.noise / cells.noise_factor(), 30);
-  if (larger) larger = fit_decays(data, larger->factors, fit.noise, 30);
-  if (larger && larger->criterion < fit.criterion) fit = std::move(*larger), larger.reset();
-  forget_useless_larger();
-  widen(all, noise);
-}
-
-ModelSearch::ModelSearch(const ExcitedCells& cells, const IdentifyOptions& options)
-    : data(cells.records, cells.driven),
-      stop_(options.stop),
-      cells_(cells.records),
-      duration_(cells.duration),
-      most_added_(3),
-      iterations_(60) {
-  const int most = options.max_order > 0
-                       ? options.max_order
-                       : static_cast<int>(std::min<Index>(2 * data.channels + 16, 32));
-  by_order = common_denominator_poles(cells.bridged, cells.step, most, cells.highest);
-  for (std::vector<RealizedPole>& poles : by_order) {
-    for (RealizedPole& pole : poles) {
-      pole.shape = pole.shape.cwiseProduct(cells.noise.cast<Complex>()).normalized();
-    }
-  }
-  poles_of_rest_ = [&cells](const std::vector<MatrixXd>& rest) {
-    std::vector<MotionRecord> records = cells.bridged;
-    for (std::size_t r = 0; r < records.size(); ++r) records[r].output = rest[r];
-    return common_denominator_poles(records, cells.step, 2, cells.highest);
-  };
-  choose_order(cells.noise, false);
-  improve();
-  while (factor_width(fit.factors) < 2 * data.channels - 1 && split_one()) {
-    while (drop_one()) continue;
-  }
-  // A model that none larger was compared with is not known to be large enough.
-  for (int k = 0; k < 4 && !larger && add_from_rest(); ++k) {
-    while (drop_one()) continue;
-  }
-  forget_useless_larger();
-  scatter.resize(fit.factors.size());
-  widen(cells.noise);
-}
-
-void ModelSearch::refine(const ExcitedCells& all) {
-  data = DecayData(all.records, all.driven);
-  fit = fit_decays(data, fit.factors, all.noise, iterations_);
-  larger.reset();
-  widen(all.noise);
-}
-
-/// Returns the criterion with a price of parameters that grows with the motion that no model
-/// explains, because its squares are fewer independent numbers than samples (quasi-likelihood;
-/// Lebreton et al. 1992).
-double ModelSearch::score(const DecayFit& some) const {
-  return some.criterion + (colour_ - 1) * parameter_penalty(some, data);
-}
-
-/// Each record with a slope of its own, as slow drift of the sensors, if that explains more.
-void ModelSearch::try_drift() {
-  const DecayFit before = fit;
-  const std::optional<DecayFit> larger_before = larger;
-  std::vector<DecayFactor> kept;
-  for (const DecayFactor& factor : fit.factors) {
-    const double slowest = factor.eigenvalues()[0].real() * duration_;
-    if (factor.pair || slowest < -kDrifts) kept.push_back(factor);
-  }
-  if (kept.empty()) kept = fit.factors;
-  data.set_drifts(true);
-  fit = fit_decays(data, kept, before.noise, iterations_);
-  if (score(fit) < score(before)) {
-    larger.reset();
-    while (drop_one()) continue;
-    return;
-  }
-  data.set_drifts(false);
-  fit = before;
-  larger = larger_before;
-}
-
-void ModelSearch::improve() {
-  for (int k = 0; k < most_added_ && add_from_rest(); ++k) continue;
-  while (drop_one()) continue;
-  untangle();
-}
-
-/// More eigenvalues than a linear arm of as many joints as channels has are products, if these
-/// explain the records better.
-void ModelSearch::try_products(const VectorXd& noise) {
-  DecayFit plain = fit;
-  std::optional<DecayFit> plain_larger = std::exchange(larger, std::nullopt);
-  const int plain_order = order;
-  choose_order(noise, true);
-  improve();
-  if (score(fit) < score(plain)) return;
-  fit = std::move(plain);
-  larger = std::move(plain_larger);
-  order = plain_order;
-}
-
-/// Forgets a larger model that fits no better: nothing is learnt from it.
-void ModelSearch::forget_useless_larger() {
-  const double gained = larger ? larger->criterion - fit.criterion : 0;
-  if (larger && (!larger->covariance.allFinite() ||
-                 gained > parameter_penalty(*larger, data) - parameter_penalty(fit, data))) {
-    larger.reset();
-  }
-}
-
-void ModelSearch::choose_order(const VectorXd& noise, bool products) {
-  std::vector<DecayFit> all(by_order.size());
+/// Fits models of rising order, plain ones once, and takes the best one.
+void choose_order(Search& search, const VectorXd& noise, bool products) {
+  FoundModel& found = search.found;
+  std::vector<DecayFit> all(found.by_order.size());
   double least = std::numeric_limits<double>::infinity();
   int worse = 0;
-  const auto orders = static_cast<double>(by_order.size());
-  for (std::size_t n = 0; n < by_order.size() && worse < (rough_ ? 3 : 6); ++n) {
-    if (std::isfinite(least) && !goes_on(0.5 * static_cast<double>(n) / orders)) break;
-    if (n == plain_by_order_.size()) {
-      const std::vector<DecayFactor> factors = factors_of(by_order[n], duration_);
-      plain_by_order_.push_back(factors.empty() ? DecayFit{}
-                                                : fit_decays(data, factors, noise, iterations_));
+  const auto orders = static_cast<double>(all.size());
+  for (std::size_t n = 0; n < all.size() && worse < search.limits.worse; ++n) {
+    if (std::isfinite(least) && !search.goes_on(kOrdersDone * static_cast<double>(n) / orders))
+      break;
+    if (n == search.plain_by_order.size()) {
+      const std::vector<DecayFactor> factors = factors_of(found.by_order[n], search.duration);
+      search.plain_by_order.push_back(
+          factors.empty() ? DecayFit{}
+                          : fit_decays(found.data, factors, noise, search.limits.iterations));
     }
-    all[n] = plain_by_order_[n];
+    all[n] = search.plain_by_order[n];
     if (all[n].factors.empty()) continue;  // no decay
     if (products) {
-      DecayFit bent = with_products(data, all[n]);
+      DecayFit bent = with_products(found.data, all[n]);
       if (bent.criterion < all[n].criterion) all[n] = std::move(bent);
     }
     ++worse;
     if (all[n].criterion < least) least = all[n].criterion, worse = 0;
   }
-  colour_ = std::numeric_limits<double>::infinity();
+  search.colour = std::numeric_limits<double>::infinity();
   for (const DecayFit& there : all) {
-    if (!there.factors.empty()) colour_ = std::min(colour_, there.whiteness);
+    if (!there.factors.empty()) search.colour = std::min(search.colour, there.whiteness);
   }
-  check_that(std::isfinite(colour_), "no decay is to be seen");
+  check_that(std::isfinite(search.colour), "no decay is to be seen");
   least = std::numeric_limits<double>::infinity();
   for (std::size_t n = 0; n < all.size(); ++n) {
-    if (all[n].factors.empty() || score(all[n]) >= least) continue;
-    least = score(all[n]);
-    fit = all[n];
-    order = static_cast<int>(n) + 1;
+    if (all[n].factors.empty() || search.score(all[n]) >= least) continue;
+    least = search.score(all[n]);
+    found.fit = all[n];
+    found.order = static_cast<int>(n) + 1;
   }
 }
 
-bool ModelSearch::change(const std::vector<DecayFactor>& factors) {
-  // A larger model that is not worth it may still say something, if it fits better.
-  const double before = fit.criterion - parameter_penalty(fit, data);
-  DecayFit there = fit_decays(data, factors, fit.noise, iterations_, before + kDifference);
-  if (score(there) < score(fit)) {
-    fit = std::move(there);
-    larger.reset();
-    return true;
-  }
-  if (factors.size() > fit.factors.size() && (!larger || there.criterion < larger->criterion)) {
-    larger = std::move(there);
-  }
-  return false;
+/// More eigenvalues than a linear arm of as many joints as channels has are products, if these
+/// explain the records better.
+void try_products(Search& search, const VectorXd& noise) {
+  FoundModel plain = search.found;
+  search.found.larger.reset();
+  choose_order(search, noise, true);
+  improve(search);
+  if (!(search.score(search.found.fit) < search.score(plain.fit))) search.found = std::move(plain);
 }
 
-std::vector<DecayFactor> ModelSearch::candidates() const {
-  std::vector<MatrixXd> rest;
-  for (const MotionRecord& record : cells_) {
-    rest.emplace_back(MatrixXd::Zero(record.output.rows(), record.output.cols()));
-  }
-  const auto over = left_over(data, fit);
-  for (std::size_t k = 0; k < over.size(); ++k) {
-    for (std::size_t c = 0; c < data.parts[k].channels.size(); ++c) {
-      const Index channel = data.parts[k].channels[c];
-      Index at = 0;
-      for (std::size_t r = 0; r < rest.size(); ++r) {
-        for (Index i = 0; i < rest[r].cols(); ++i) {
-          if (!std::isfinite(cells_[r].output(channel, i))) continue;
-          rest[r](channel, i) = over[k](at++, static_cast<Index>(c)) / fit.noise[channel];
-        }
-      }
-    }
-  }
-  std::vector<DecayFactor> result;
-  for (const std::vector<RealizedPole>& poles : poles_of_rest_(rest)) {
-    for (const DecayFactor& factor : factors_of(poles, duration_)) {
-      const bool known = std::any_of(result.begin(), result.end(), [&](const DecayFactor& other) {
-        const Complex a = factor.eigenvalues()[0], b = other.eigenvalues()[0];
-        return factor.pair == other.pair && std::abs(a - b) < 0.1 * std::abs(a);
-      });
-      if (!known) result.push_back(factor);
-    }
-  }
-  return result;
-}
-
-bool ModelSearch::add_from_rest() {
-  for (const DecayFactor& factor : candidates()) {
-    if (!goes_on(0.6)) return false;
-    std::vector<DecayFactor> factors = fit.factors;
-    factors.push_back(factor);
-    if (change(factors)) return true;
-  }
-  return false;
-}
-
-/// Two heavily damped modes near each other look like one, and what is left over does not show it.
-bool ModelSearch::split_one() {
-  constexpr double kApart = 0.15, kDamped = 0.3;
-  for (std::size_t k = 0; k < fit.factors.size(); ++k) {
-    if (!fit.factors[k].pair || fit.factors[k].second < kDamped) continue;
-    if (!goes_on(0.7)) return false;
-    std::vector<DecayFactor> factors = fit.factors;
-    factors[k].scale.clear();
-    factors.push_back(factors[k]);
-    factors[k].first -= kApart;
-    factors.back().first += kApart;
-    if (change(factors)) return true;
-  }
-  return false;
-}
-
-bool ModelSearch::drop_one() {
-  Index at = 0;
-  for (std::size_t k = 0; k < fit.factors.size() && fit.factors.size() > 1; ++k) {
-    if (!goes_on(0.8)) return false;
-    const Index first = at;
-    at += fit.factors[k].parameters();
-    const double size = fit.factors[k].pair ? 1 : std::abs(fit.factors[k].first);
-    if (std::sqrt(fit.covariance(first, first)) < 0.02 * size) continue;  // it is there
-    std::vector<DecayFactor> factors = fit.factors;
-    factors.erase(factors.begin() + static_cast<std::ptrdiff_t>(k));
-    if (change(factors)) return true;
-    if (!fit.factors[k].pair) continue;
-    // A pair of real eigenvalues of which the data show one.
-    const auto lambda = fit.factors[k].eigenvalues();
-    if (lambda[0].imag() != 0) continue;
-    for (const Complex& one : lambda) {
-      factors = fit.factors;
-      factors[k] = fit.factors[k].one_of_pair(one.real());
-      if (change(factors)) return true;
-    }
-  }
-  return false;
-}
-
-/// Factors that cancel against each other are where a search got lost: begins again without them.
-void ModelSearch::untangle() {
-  constexpr double kCancels = 30;
+/// Each record with a slope of its own, as slow drift of the sensors, if that explains more.
+void try_drift(Search& search) {
+  FoundModel& found = search.found;
+  FoundModel before = found;
   std::vector<DecayFactor> kept;
-  double all = 0;
-  for (const DecayPart& part : data.parts) {
-    for (std::size_t c = 0; c < part.channels.size(); ++c) {
-      all += static_cast<double>(samples_of(part)) *
-             std::pow(data.motion[part.channels[c]] / fit.noise[part.channels[c]], 2);
-    }
+  for (const DecayFactor& factor : found.fit.factors) {
+    const double slowest = factor.eigenvalues()[0].real() * search.duration;
+    if (factor.pair || slowest < -kDrifts) kept.push_back(factor);
   }
-  for (std::size_t k = 0; k < fit.factors.size(); ++k) {
-    if (energy_of(data, fit, k) < kCancels * all) kept.push_back(fit.factors[k]);
+  if (kept.empty()) kept = found.fit.factors;
+  found.data.set_drifts(true);
+  found.fit = fit_decays(found.data, kept, before.fit.noise, search.limits.iterations);
+  if (search.score(found.fit) < search.score(before.fit)) {
+    found.larger.reset();
+    drop_useless(search);
+  } else {
+    found = std::move(before);
   }
-  if (kept.size() == fit.factors.size() || kept.empty()) return;
-  auto before = std::pair(fit, larger);
-  fit = fit_decays(data, kept, fit.noise, 40);
-  for (int k = 0; k < 4 && add_from_rest(); ++k) continue;
-  while (drop_one()) continue;
-  if (!(score(fit) < score(before.first))) std::tie(fit, larger) = std::move(before);
+}
+
+/// Forgets a larger model that fits no better: nothing is learnt from it.
+void forget_useless_larger(FoundModel& found) {
+  if (!found.larger) return;
+  const double gained = found.larger->criterion - found.fit.criterion;
+  if (!found.larger->covariance.allFinite() ||
+      gained >
+          parameter_penalty(*found.larger, found.data) - parameter_penalty(found.fit, found.data)) {
+    found.larger.reset();
+  }
+}
+
+/// Refines the model of the cells of some records on the samples of all, as they are.
+void refine_on_samples(FoundModel& found, DecayData samples, const DecayCells& cells) {
+  samples.rounding = found.data.rounding;
+  samples.set_drifts(found.data.drifts());
+  found.data = std::move(samples);
+  if (found.data.records > cells.records.size()) {
+    for (DecayFactor& factor : found.fit.factors) factor.scale.clear();
+    found.larger.reset();
+  }
+  DecayFit& fit = found.fit;
+  std::optional<DecayFit>& larger = found.larger;
+  fit = fit_decays(found.data, fit.factors, fit.noise / cells.noise_factor(), kLastIterations);
+  if (larger) larger = fit_decays(found.data, larger->factors, fit.noise, kLastIterations);
+  if (larger && larger->criterion < fit.criterion) fit = std::move(*larger), larger.reset();
+  forget_useless_larger(found);
+}
+
+}  // namespace
+
+FoundModel find_model(const std::vector<MotionRecord>& all, const IdentifyOptions& options) {
+  DecayData samples(all);
+  VectorXd rounding;
+  const VectorXd noise = first_noise(all, &rounding);
+  const std::vector<MotionRecord> records = strongest(all, noise);
+  const DecayCells cells(records, noise, noise.cwiseMax(DecayData::kLinear * samples.motion),
+                         options.refine ? kSearchCells : 0);
+  const Index channels = samples.channels;
+  Search search{.cells = cells.records,
+                .duration = cells.duration,
+                .limits = options.refine ? kOfDecays : kRough,
+                .poles_of_rest =
+                    [step = cells.step, channels](const std::vector<MatrixXd>& rest) {
+                      return rest_poles(rest, step, channels);
+                    },
+                .stop = options.stop,
+                .found = {.data = DecayData(cells.records)}};
+  search.found.data.rounding = rounding;
+  const Realization realization(cells.weighted(), cells.step, channels, search.limits.rows);
+  const int wanted =
+      options.max_order > 0
+          ? options.max_order
+          : static_cast<int>(std::clamp<Index>(2 * channels, kLeastOrder, kMostOrder));
+  const int most = std::min({wanted, realization.max_order(),
+                             static_cast<int>(cells.shortest() * channels / kCellsOfOrder)});
+  check_that(most >= 1, "nothing moves");
+  for (int n = 1; n <= most; ++n) {
+    search.found.by_order.push_back(in_units_of(noise, realization.poles(n)));
+  }
+  choose_order(search, cells.noise, false);
+  if (!options.refine) return std::move(search.found);
+  improve(search);
+  if (factor_width(search.found.fit.factors) > 2 * channels) try_products(search, cells.noise);
+  try_drift(search);
+  keep_repeated(search);
+  refine_on_samples(search.found, std::move(samples), cells);
+  widen(search.found, usual_noise(all, noise, search.found.data.motion));
+  return std::move(search.found);
+}
+
+FoundModel find_model(const ExcitedCells& cells, const IdentifyOptions& options) {
+  Search search{.cells = cells.records,
+                .duration = cells.duration,
+                .limits = kDriven,
+                .poles_of_rest =
+                    [&cells](const std::vector<MatrixXd>& rest) {
+                      std::vector<MotionRecord> records = cells.bridged;
+                      for (std::size_t r = 0; r < records.size(); ++r) records[r].output = rest[r];
+                      return common_denominator_poles(records, cells.step, kOrdersOfRest,
+                                                      cells.highest);
+                    },
+                .stop = options.stop,
+                .found = {.data = DecayData(cells.records, cells.driven)}};
+  FoundModel& found = search.found;
+  const Index channels = found.data.channels;
+  const int most =
+      options.max_order > 0
+          ? options.max_order
+          : static_cast<int>(std::min<Index>(2 * channels + kOrdersOfInputs, kMostOrder));
+  for (auto& poles : common_denominator_poles(cells.bridged, cells.step, most, cells.highest)) {
+    found.by_order.push_back(in_units_of(cells.noise, std::move(poles)));
+  }
+  choose_order(search, cells.noise, false);
+  improve(search);
+  while (factor_width(found.fit.factors) < 2 * channels - 1 && split_one(search)) {
+    drop_useless(search);
+  }
+  // A model that none larger was compared with is not known to be large enough.
+  for (int k = 0; k < kSearchedOn && !found.larger && add_from_rest(search); ++k) {
+    drop_useless(search);
+  }
+  forget_useless_larger(found);
+  found.scatter.resize(found.fit.factors.size());
+  widen(found, cells.noise);
+  return std::move(found);
+}
+
+void refine(const ExcitedCells& all, FoundModel& found) {
+  found.data = DecayData(all.records, all.driven);
+  found.fit = fit_decays(found.data, found.fit.factors, all.noise, kDriven.iterations);
+  found.larger.reset();
+  widen(found, all.noise);
 }
 
 }  // namespace dashpot::identification

@@ -392,7 +392,7 @@ TEST(IdentifyDecays, DeviationsHoldWhatALargerModelThinks) {
   for (const std::uint64_t seed : {41u, 42u, 43u}) {
     Dice draw(seed);
     const std::vector<MotionRecord> records = {KnownDecay().record(3e-5, 0, draw)};
-    const ModelSearch search(records, {});
+    const FoundModel search = find_model(records, {});
     const Identification found = identify_decays(records);
     if (!search.larger) continue;
     Index at = 0;
