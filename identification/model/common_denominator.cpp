@@ -1,4 +1,5 @@
 #include <dashpot/identification/model/common_denominator.hpp>
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/motion_spectrum.hpp>
 
 #include <unsupported/Eigen/FFT>
@@ -11,12 +12,6 @@
 
 namespace dashpot::identification {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXcd;
-using Eigen::MatrixXd;
-using Eigen::VectorXcd;
-using Eigen::VectorXd;
 
 /// Spectra of the records, one after the other: lines x channels, lines x inputs, z^-1, and the
 /// record of each line.

@@ -1,4 +1,5 @@
 #include <dashpot/identification/model/decay_columns.hpp>
+#include <dashpot/identification/records/common.hpp>
 
 #include <array>
 #include <cmath>
@@ -8,14 +9,15 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
+constexpr Index kLed = 64;       ///< steps from wave to wave, after which rounding is left behind
+constexpr double kSeries = 0.5;  ///< squared angle: below it a difference of waves loses digits
+constexpr int kTerms = 12;       ///< of the series, whose last one is below 1e-23 there
+constexpr double kSmallAngle = 1e-4;  ///< sin x / x is 1 - x^2 / 6, to the last digit
 
 /// (cos x - sin x / x) / (2 x^2) for x^2 = y, with the sign that makes it -1/6 at y = 0.
 double third_difference(double y) {
   double sum = 0, term = 1.0 / 6;  // k / (2k + 1)! (-y)^(k-1), k = 1
-  for (int k = 1; k < 12; ++k) {
+  for (int k = 1; k < kTerms; ++k) {
     sum -= term;
     term *= -y * (k + 1) / k / ((2.0 * k + 2) * (2.0 * k + 3));
   }
@@ -32,11 +34,11 @@ DampedWaves damped_waves(double a, double D, double t) {
   const double y = D * t * t;
   DampedWaves wave{};
   const double fade = std::exp(-a * t / 2);
-  if (std::abs(y) < 0.5) {
+  if (std::abs(y) < kSeries) {
     const double x = std::sqrt(std::abs(y));
     const bool turns = y >= 0;
     wave.cosine = fade * (turns ? std::cos(x) : std::cosh(x));
-    wave.sine = fade * t * (x < 1e-4 ? 1 - y / 6 : (turns ? std::sin(x) : std::sinh(x)) / x);
+    wave.sine = fade * t * (x < kSmallAngle ? 1 - y / 6 : (turns ? std::sin(x) : std::sinh(x)) / x);
     wave.sine_by_d = fade * t * t * t * third_difference(y);
     return wave;
   }
@@ -148,7 +150,6 @@ class Stepper {
 
 /// A factor's motion at these times; where they are even, led on from step to step.
 std::vector<Wave> free_waves(const DecayFactor& factor, const VectorXd& time, bool derivatives) {
-  constexpr Index kLed = 64;  // steps, after which rounding is left behind
   const Index N = time.size();
   const double step = N > 1 ? time[1] - time[0] : 0;
   const Stepper stepper(factor, step);

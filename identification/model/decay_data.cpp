@@ -1,14 +1,11 @@
 #include <dashpot/identification/model/decay_data.hpp>
+#include <dashpot/identification/records/common.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 namespace dashpot::identification {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 std::array<Complex, 2> DecayFactor::eigenvalues() const {
   if (!pair) return {first, first};
@@ -83,7 +80,7 @@ DecayData::DecayData(const std::vector<MotionRecord>& all,
 }
 
 double DecayData::least_noise(Index channel) const {
-  return std::max({kLinear * motion[channel], rounding[channel], 1e-300});
+  return std::max({kLinear * motion[channel], rounding[channel], kTiny});
 }
 
 }  // namespace dashpot::identification

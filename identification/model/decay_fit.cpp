@@ -2,6 +2,7 @@
 #include <dashpot/identification/model/decay_fit.hpp>
 #include <dashpot/identification/model/decay_scales.hpp>
 #include <dashpot/identification/model/variable_projection.hpp>
+#include <dashpot/identification/records/common.hpp>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -14,10 +15,6 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// The criterion's cost of one more parameter: between Akaike's 2, which takes noise for modes, and
 /// Schwarz's logarithm of the number of samples, about 9, which lets weak modes spoil strong ones.
 constexpr double kPenalty = 4;
@@ -27,6 +24,21 @@ constexpr double kExpected = 2;
 
 /// Radians, or powers of e, from sample to sample: what is faster is over before the second one.
 constexpr double kFastest = 10;
+constexpr double kMostGrowth = 30;  ///< as an exponent over the record: more than digits can hold
+constexpr double kSlowest = 0.1;    ///< radians over the record: what is slower is a constant
+
+// Of Levenberg and Marquardt's method.
+constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-12, kMostDamping = 1e12;
+constexpr double kDampingStep = 10;
+constexpr int kPatience = 3;               ///< iterations before a fit may be given up,
+constexpr double kFurther = 30;            ///< if so many gains like the last one do not save it
+constexpr double kLeastRecordNoise = 0.1;  ///< of the mean: no record counts for all others
+constexpr double kSettledNoise = 0.02;     ///< change of its logarithm that moves no factor
+
+// Of what is determined. A ridge grows from rounding until the normal matrix is definite.
+constexpr double kRidge = 1e-9, kRidgeStep = 100;
+constexpr double kUnderflow = 1e-200;  ///< squares of derivatives: below it they are none
+constexpr double kDetermined = 1e-13;  ///< of the largest eigenvalue: what is less is rounding
 
 std::vector<DecayFactor> moved(const std::vector<DecayFactor>& factors, const VectorXd& step) {
   std::vector<DecayFactor> result = factors;
@@ -48,8 +60,8 @@ bool makes_sense(const std::vector<DecayFactor>& factors, double longest, double
   return std::all_of(factors.begin(), factors.end(), [&](const DecayFactor& factor) {
     const auto lambda = factor.eigenvalues();
     return std::max(modulus(lambda[0]), modulus(lambda[1])) < fastest &&
-           std::max(lambda[0].real(), lambda[1].real()) * longest < 30 &&
-           modulus(lambda[0]) * longest > 0.1;  // else it is a constant
+           std::max(lambda[0].real(), lambda[1].real()) * longest < kMostGrowth &&
+           modulus(lambda[0]) * longest > kSlowest;
   });
 }
 
@@ -78,7 +90,7 @@ class Descent {
     const double fastest = kFastest / step_of_time;
     const double enough = max_iterations > kFew ? kSmallGain : kSearchGain;
     VariableProjection now(data_, fit_.factors, fit_.noise, fit_.record_noise);
-    double lambda = 1e-3;
+    double lambda = kFirstDamping;
     int quiet = 0;
     for (int i = 0; i < max_iterations; ++i) {
       const double before = misfit(now);
@@ -89,9 +101,9 @@ class Descent {
       }
       now.differentiate();
       bool better = false;
-      while (!better && lambda < 1e12) {
+      while (!better && lambda < kMostDamping) {
         MatrixXd A = now.normal;
-        A.diagonal() += lambda * now.normal.diagonal().cwiseMax(1e-300);
+        A.diagonal() += lambda * now.normal.diagonal().cwiseMax(kTiny);
         const VectorXd step = A.ldlt().solve(now.gradient);
         if (!step.allFinite()) return false;
         if (step.dot(now.gradient) < enough && settled) return true;  // no step promises more
@@ -102,14 +114,14 @@ class Descent {
           if (gain >= 0) {
             fit_.factors = next;
             now = std::move(there);
-            hopeless_ = i > 3 && misfit(now) - 30 * (before - misfit(now)) > hopeless;
+            hopeless_ = i > kPatience && misfit(now) - kFurther * (before - misfit(now)) > hopeless;
             if (hopeless_) return false;
             if (gain < enough && ++quiet > 1) return take_noise(now), true;
-            lambda = std::max(1e-12, lambda / 10);
+            lambda = std::max(kLeastDamping, lambda / kDampingStep);
             better = true;
           }
         }
-        if (!better) lambda *= 10;
+        if (!better) lambda *= kDampingStep;
       }
       if (!better) return true;  // at the minimum to rounding
     }
@@ -158,12 +170,12 @@ class Descent {
       fit_.record_noise = (relative.colwise().sum().transpose())
                               .cwiseQuotient(there.count.colwise().sum().transpose())
                               .cwiseSqrt()
-                              .cwiseMax(0.1);
+                              .cwiseMax(kLeastRecordNoise);
       fit_.record_noise /= std::exp(fit_.record_noise.array().log().mean());
     }
     return std::max((fit_.noise.array() / noise_before.array()).log().abs().maxCoeff(),
                     (fit_.record_noise.array() / record_before.array()).log().abs().maxCoeff()) <
-           0.02;
+           kSettledNoise;
   }
 
   const DecayData& data_;
@@ -178,9 +190,9 @@ double variance_growth(const VariableProjection& evaluation) {
   const Index p = evaluation.normal.rows();
   if (p == 0) return 1;
   // Where factors are alike, some direction is not determined, and says nothing.
-  for (double ridge = 1e-9; ridge < 1; ridge *= 100) {
+  for (double ridge = kRidge; ridge < 1; ridge *= kRidgeStep) {
     MatrixXd normal = evaluation.normal;
-    normal.diagonal() = normal.diagonal().cwiseMax(1e-300) * (1 + ridge);
+    normal.diagonal() = normal.diagonal().cwiseMax(kTiny) * (1 + ridge);
     const Eigen::LLT<MatrixXd> factor(normal);
     if (factor.info() != Eigen::Success) continue;
     return std::max(1.0, evaluation.squared_scores(factor) / static_cast<double>(p));
@@ -195,11 +207,11 @@ DecayStep step_of(const VariableProjection& there, const DecayData& data,
   // Scaled, so that parameters of unlike size are no deficiency. One that moves nothing, so that
   // squares underflow, tells nothing and is not determined.
   const VectorXd scale = there.normal.diagonal().unaryExpr(
-      [](double square) { return square > 1e-200 ? 1 / std::sqrt(square) : 0; });
+      [](double square) { return square > kUnderflow ? 1 / std::sqrt(square) : 0; });
   // Where two factors have become alike, some direction is not determined; the others still are.
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(scale.asDiagonal() * there.normal *
                                                        scale.asDiagonal());
-  const VectorXd least = VectorXd::Constant(p, 1e-13 * solver.eigenvalues().maxCoeff());
+  const VectorXd least = VectorXd::Constant(p, kDetermined * solver.eigenvalues().maxCoeff());
   const VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
   const MatrixXd all = scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
                        solver.eigenvectors().transpose() * scale.asDiagonal();

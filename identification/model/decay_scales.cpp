@@ -1,14 +1,11 @@
 #include <dashpot/identification/model/decay_columns.hpp>
 #include <dashpot/identification/model/decay_scales.hpp>
+#include <dashpot/identification/records/common.hpp>
 
 #include <Eigen/QR>
 #include <algorithm>
 
 namespace dashpot::identification {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 namespace {
 
@@ -63,7 +60,7 @@ void find_scales(const DecayData& data, const VectorXd& noise, std::vector<Decay
       MatrixXd output = part.output;
       take_constants(part, basis);
       take_constants(part, output);
-      const VectorXd norm = basis.colwise().norm().transpose().cwiseMax(1e-300);
+      const VectorXd norm = basis.colwise().norm().transpose().cwiseMax(kTiny);
       basis *= norm.cwiseInverse().asDiagonal();
       const MatrixXd all =
           norm.cwiseInverse().asDiagonal() * basis.colPivHouseholderQr().solve(output);

@@ -1,4 +1,5 @@
 #include <dashpot/identification/model/excited_cells.hpp>
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_spectrum.hpp>
 
@@ -11,14 +12,17 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr Index kMostCells = 8000;  // of all records
-constexpr double kBin = 0.04;       // of the band of the inputs: bins that count together
-constexpr double kBridge = 3.5;     // steps, over which samples are interpolated
+constexpr Index kMostCells = 8000;   // of all records
+constexpr double kBin = 0.04;        // of the band of the inputs: bins that count together
+constexpr double kBridge = 3.5;      // steps, over which samples are interpolated
+constexpr double kInBand = 0.99;     // share of the inputs' squares within their band
+constexpr double kBeyondInputs = 3;  // times the inputs' band, or a part: motion is within them
+constexpr double kLeastCells = 1.5, kWantedCells = 2.2;  // in half a period of the fastest motion
+constexpr Index kFewestCells = 20;                       // of a record
+// Of a length, so that rounding leaves no point out; of a step, a sample that is no later, and one
+// that is taken as it is.
+constexpr double kOfLength = 1e-9, kSameTime = 1e-6, kOnTime = 1e-3;
 
 /// rad/s below which 99 % of what the inputs do is.
 double input_band(const std::vector<DrivenGrid>& grids) {
@@ -34,7 +38,7 @@ double input_band(const std::vector<DrivenGrid>& grids) {
       const double all = power.sum();
       double sum = 0;
       Index k = 0;
-      while (k < power.size() && sum < 0.99 * all) sum += power[k++];
+      while (k < power.size() && sum < kInBand * all) sum += power[k++];
       if (all > 0) band = std::max(band, width * static_cast<double>(k));
     }
   }
@@ -60,7 +64,7 @@ double between(const VectorXd& time, const VectorXd& y, const std::vector<Index>
 void put_on_grid(const MotionRecord& record, double step, MatrixXd& output, DrivenGrid& driven) {
   const VectorXd& time = record.time;
   const double length = time[time.size() - 1] - time[0];
-  const auto N = static_cast<Index>(std::floor(length / step * (1 + 1e-9))) + 1;
+  const auto N = static_cast<Index>(std::floor(length / step * (1 + kOfLength))) + 1;
   output.setConstant(record.output.rows(), N, kNaN);
   driven.input.resize(record.input.rows(), N);
   driven.step = step;
@@ -79,8 +83,8 @@ void put_on_grid(const MotionRecord& record, double step, MatrixXd& output, Driv
     std::size_t right = 0;
     for (Index k = 0; k < N; ++k) {
       const double t = time[0] + static_cast<double>(k) * step;
-      while (right + 1 < there.size() && time[there[right]] < t - 1e-6 * step) ++right;
-      if (std::abs(time[there[right]] - t) < 1e-3 * step) {
+      while (right + 1 < there.size() && time[there[right]] < t - kSameTime * step) ++right;
+      if (std::abs(time[there[right]] - t) < kOnTime * step) {
         output(c, k) = y[there[right]];
       } else if (right > 0 && time[there[right]] - time[there[right - 1]] < kBridge * step) {
         output(c, k) = between(time, y, there, right, t);
@@ -124,21 +128,22 @@ ExcitedCells::ExcitedCells(const std::vector<MotionRecord>& all) {
   for (MatrixXd whole : grids) {
     bridge(whole);
     const double width = 2 * std::numbers::pi / (static_cast<double>(whole.cols()) * fine);
-    highest = std::max(highest,
-                       band_of_motion(whole, fine, sample_noise,
-                                      std::max<Index>(8, static_cast<Index>(kBin * band / width))));
+    highest = std::max(
+        highest,
+        band_of_motion(whole, fine, sample_noise,
+                       std::max<Index>(kFewestLines, static_cast<Index>(kBin * band / width))));
   }
   if (!(highest > 0)) throw std::invalid_argument("identify: nothing follows the inputs");
-  highest = std::clamp(highest, band / 3, 3 * band);
-  const auto most = static_cast<Index>(std::numbers::pi / (1.5 * highest * fine));
-  const auto wanted = static_cast<Index>(std::numbers::pi / (2.2 * highest * fine));
+  highest = std::clamp(highest, band / kBeyondInputs, kBeyondInputs * band);
+  const auto most = static_cast<Index>(std::numbers::pi / (kLeastCells * highest * fine));
+  const auto wanted = static_cast<Index>(std::numbers::pi / (kWantedCells * highest * fine));
   const Index per_cell = std::max<Index>(1, std::min(most, std::max(wanted, points / kMostCells)));
   step = fine * static_cast<double>(per_cell);
   noise = sample_noise / std::sqrt(static_cast<double>(per_cell));
   for (std::size_t r = 0; r < all.size(); ++r) {
     (*grids_driven)[r].per_cell = per_cell;
     const Index cells = grids[r].cols() / per_cell;
-    if (cells < 20) throw std::invalid_argument("identify: a record is too short");
+    if (cells < kFewestCells) throw std::invalid_argument("identify: a record is too short");
     MotionRecord record{VectorXd(cells), MatrixXd(grids[r].rows(), cells),
                         MatrixXd((*grids_driven)[r].input.rows(), cells)};
     for (Index k = 0; k < cells; ++k) {

@@ -1,4 +1,5 @@
 #include <dashpot/identification/model/realization.hpp>
+#include <dashpot/identification/records/common.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
@@ -10,11 +11,21 @@
 
 namespace dashpot::identification {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
 /// What has fallen to this share by the next sample is over, and no sum of decays shows it.
 constexpr double kOver = 1e-4;
+constexpr double kRank = 1e-14;  ///< of the largest singular value: the rest is rounding
+
+double likeness(const Eigen::VectorXcd& u, const Eigen::VectorXcd& v) {
+  return std::norm(u.dot(v)) / std::max(kTiny, u.squaredNorm() * v.squaredNorm());
+}
+
+Eigen::VectorXcd turned(const Eigen::VectorXcd& shape) {
+  Index largest = 0;
+  shape.cwiseAbs().maxCoeff(&largest);
+  const double size = std::abs(shape[largest]);
+  if (size == 0) return shape;
+  return (shape * (std::conj(shape[largest]) / size)).normalized();
+}
 
 Realization::Realization(const std::vector<MatrixXd>& sequences, double step, Index channels,
                          Index max_rows)
@@ -66,7 +77,7 @@ void Realization::take_basis(MatrixXd hankel) {
   const Eigen::BDCSVD<MatrixXd> svd(hankel, Eigen::ComputeThinV);
   const auto& sizes = svd.singularValues();
   Index rank = 0;
-  while (rank < sizes.size() && sizes[rank] > 1e-14 * sizes[0]) ++rank;
+  while (rank < sizes.size() && sizes[rank] > kRank * sizes[0]) ++rank;
   Index shifts = 0;
   for (std::size_t i = 1; i < delays_.size(); ++i) shifts += delays_[i] == delays_[i - 1] + 1;
   rank = std::min(rank, shifts * block_);

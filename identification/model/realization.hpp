@@ -11,6 +11,12 @@ struct RealizedPole {
   Eigen::VectorXcd shape;  ///< channels, unit length
 };
 
+/// |u' v|^2 / (|u|^2 |v|^2), the modal assurance criterion.
+double likeness(const Eigen::VectorXcd& u, const Eigen::VectorXcd& v);
+
+/// Returns the shape with unit length, its largest entry real and positive.
+Eigen::VectorXcd turned(const Eigen::VectorXcd& shape);
+
 /// Models x(k+1) = A x(k), y(k) = C x(k) of rising order for sequences that are sums of decays: the
 /// eigensystem realization algorithm (Juang and Pappa 1985), with A from the shift within the
 /// observability matrix that the left singular vectors of the block Hankel matrix are. Of

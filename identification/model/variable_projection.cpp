@@ -1,13 +1,10 @@
 #include <dashpot/identification/model/variable_projection.hpp>
+#include <dashpot/identification/records/common.hpp>
 
 #include <algorithm>
 #include <cmath>
 
 namespace dashpot::identification {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 VariableProjection::VariableProjection(const DecayData& data,
                                        const std::vector<DecayFactor>& factors,
@@ -99,7 +96,7 @@ VariableProjection::Fitted VariableProjection::fit(const DecayPart& part, const 
   basis = weight.asDiagonal() * basis;
   output = weight.asDiagonal() * output;
   // Columns of very different size, as those of a mode that is over at once, are no deficiency.
-  const VectorXd size = basis.colwise().norm().transpose().cwiseMax(1e-300);
+  const VectorXd size = basis.colwise().norm().transpose().cwiseMax(kTiny);
   basis *= size.cwiseInverse().asDiagonal();
   Fitted fitted{Eigen::ColPivHouseholderQR<MatrixXd>(basis), std::move(weight), {}, {}};
   const auto& qr = fitted.qr;

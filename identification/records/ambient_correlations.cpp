@@ -1,4 +1,5 @@
 #include <dashpot/identification/records/ambient_correlations.hpp>
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 
 #include <algorithm>
@@ -13,11 +14,6 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXcd;
-using Eigen::VectorXd;
-
 constexpr Index kParts = 20;         // the standard deviations are theirs
 constexpr Index kMostRows = 300;     // of the Hankel matrix
 constexpr Index kMostLags = 600;     // correlations looked at
@@ -26,6 +22,9 @@ constexpr double kCellsPerHalf = 3;  // cells in half a period of the end of the
 constexpr double kAudible = 2.5;     // standard errors of a correlation that is used
 constexpr Index kLargestWindow = 4096;
 constexpr double kLongGap = 20;         // samples
+constexpr Index kShortPiece = 20;       // samples: nothing is to be seen in fewer
+constexpr Index kFewestLags = 8;        // of a third of a part: two modes in one channel
+constexpr double kAboveNoise = 1.5;     // times its power: what stands out of its spectrum
 constexpr double kLeastMotion = 1e-10;  // of a channel, relative to its mean
 
 /// Below it lies nearly all that the channels' velocities do beyond noise, rad/s (Welch 1967).
@@ -54,7 +53,7 @@ double band_of(const std::vector<MatrixXd>& grids, double step, const VectorXd& 
   const double w = 2 * std::numbers::pi / (static_cast<double>(window) * step);
   double band = 0;
   for (Index c = 0; c < power.cols(); ++c) {
-    const double floor = 1.5 * noise[c] * noise[c];
+    const double floor = kAboveNoise * noise[c] * noise[c];
     VectorXd sum(power.rows());
     double velocity = 0;
     for (Index k = 0; k < sum.size(); ++k) {
@@ -87,7 +86,7 @@ std::vector<MotionRecord> unbroken(const std::vector<MotionRecord>& records, dou
     }
     take(from, last + 1);
   }
-  const Index least = std::max<Index>(20, samples / (2 * kParts));
+  const Index least = std::max<Index>(kShortPiece, samples / (2 * kParts));
   std::erase_if(pieces, [least](const MotionRecord& piece) { return piece.time.size() < least; });
   return pieces;
 }
@@ -97,7 +96,7 @@ void require_length(bool enough, Index length) {
   throw std::invalid_argument(
       "identify: motion under unknown forces takes a longer record to show anything: " +
       std::to_string(length * kParts) + " samples at its pace, need " +
-      std::to_string(24 * kParts));
+      std::to_string(3 * kFewestLags * kParts));
 }
 
 /// Means of `cell` samples each, about the record's mean, in units of the channels' `sizes`.
@@ -166,7 +165,7 @@ AmbientCorrelations::AmbientCorrelations(const std::vector<MotionRecord>& record
                             sample));
   step = static_cast<double>(cell) * sample;
   sizes = VectorXd::Zero(grids[0].rows());
-  VectorXd least = VectorXd::Constant(sizes.size(), 1e-300);
+  VectorXd least = VectorXd::Constant(sizes.size(), kTiny);
   for (const MatrixXd& grid : grids) {
     const VectorXd mean = grid.rowwise().mean();
     sizes += (grid.colwise() - mean).rowwise().squaredNorm();
@@ -176,7 +175,7 @@ AmbientCorrelations::AmbientCorrelations(const std::vector<MotionRecord>& record
 
   const Index length = std::min(samples / kParts, shortest) / cell;
   const Index lags = std::min(length / 3, kMostLags);
-  require_length(lags >= 8, length);
+  require_length(lags >= kFewestLags, length);
   for (const MatrixXd& grid : grids) {
     const MatrixXd cells = cells_of(grid, cell, sizes);
     for (Index at = 0; at + length <= cells.cols(); at += length) {
@@ -202,8 +201,8 @@ void AmbientCorrelations::shorten(Index lags) {
     for (const MatrixXd& m : spread) error += m.col(k).sum() / (count * (count - 1));
     if (squares(all, k, 1) > kAudible * kAudible * error) last = k;
   }
-  delays =
-      delays_to(std::max<Index>(4, (last + 1) / 2), std::max<Index>(8, kMostRows / all[0].rows()));
+  delays = delays_to(std::max<Index>(4, (last + 1) / 2),
+                     std::max<Index>(kFewestLags, kMostRows / all[0].rows()));
   const Index used = 2 * delays.back() + 1;
   for (Correlations& part : parts) {
     for (MatrixXd& m : part) m.conservativeResize(Eigen::NoChange, std::min(lags, used));

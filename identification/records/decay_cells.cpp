@@ -1,3 +1,4 @@
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_spectrum.hpp>
 
@@ -11,15 +12,21 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
+constexpr Index kCellsOfAll = 600, kFewCells = 100, kManyCells = 300;
 /// Cells of a record; each of many records has fewer.
 Index usual_cells(std::size_t records) {
-  return std::clamp<Index>(600 / static_cast<Index>(records), 100, 300);
+  return std::clamp<Index>(kCellsOfAll / static_cast<Index>(records), kFewCells, kManyCells);
 }
 
+constexpr Index kEnd = 10;  // part of a record at its end, where it rests
+constexpr Index kStretchesHeard = 50, kLeastHeard = 20;  // of a record, and samples of it
+// Squares of what is heard, in units of the noise: not quite white, and beyond chance.
+constexpr double kMuchNoise = 1.5, kSurely = 5;
+constexpr double kWindowsOfWidth = 1.5;  // as many windows tell the least singular values
+constexpr double kQuiet = 0.9, kQuietDeviations = 1.645;  // share of normal noise within them
+constexpr double kOfWhole = 1e-12;    // of a length: rounding leaves no point out
+constexpr double kDigits = 1e-13;     // of the largest sample: no noise is less
+constexpr double kWideGap = 2.5;      // steps
 constexpr double kOversampled = 1.5;  // cells in half a period, at least
 constexpr double kBand = 0.02;        // of all frequencies: lines of a spectrum that count together
 
@@ -33,7 +40,7 @@ double quantile(std::vector<double> values, double share) {
 }
 
 VectorXd end_of(const MatrixXd& grid) {
-  const Index tenth = std::max<Index>(1, grid.cols() / 10);
+  const Index tenth = std::max<Index>(1, grid.cols() / kEnd);
   return grid.rightCols(tenth).rowwise().mean();
 }
 
@@ -53,7 +60,8 @@ double unpredictable(const MotionRecord& record, Index channel) {
     covariance.selfadjointView<Eigen::Lower>().rankUpdate(VectorXd(window.array() - window.mean()));
     ++count;
   }
-  if (count < 1.5 * static_cast<double>(width)) return std::numeric_limits<double>::infinity();
+  if (count < kWindowsOfWidth * static_cast<double>(width))
+    return std::numeric_limits<double>::infinity();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(covariance / count, Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(0.0, solver.eigenvalues()[1 + 2 * width / 5]));
 }
@@ -62,14 +70,14 @@ double unpredictable(const MotionRecord& record, Index channel) {
 
 Index audible(const MatrixXd& grid, const VectorXd& noise) {
   const MatrixXd y = noise.cwiseInverse().asDiagonal() * (grid.colwise() - end_of(grid));
-  const Index window = std::max<Index>(1, grid.cols() / 50);
+  const Index window = std::max<Index>(1, grid.cols() / kStretchesHeard);
   const double samples = static_cast<double>(window * grid.rows());
-  const double least = 1.5 + 5 * std::sqrt(2 / samples);
+  const double least = kMuchNoise + kSurely * std::sqrt(2 / samples);
   Index last = 0;
   for (Index at = 0; at + window <= grid.cols(); at += window) {
     if (y.middleCols(at, window).squaredNorm() / samples > least) last = at + window;
   }
-  return std::max(last, std::min<Index>(grid.cols(), 20));
+  return std::max(last, std::min(grid.cols(), kLeastHeard));
 }
 
 double typical_step(const std::vector<MotionRecord>& records) {
@@ -84,7 +92,7 @@ double typical_step(const std::vector<MotionRecord>& records) {
 MatrixXd on_grid(const MotionRecord& record, double step, MatrixXd* widths) {
   const VectorXd& time = record.time;
   const double length = time[time.size() - 1] - time[0];
-  const auto N = static_cast<Index>(std::floor(length / step * (1 + 1e-12))) + 1;
+  const auto N = static_cast<Index>(std::floor(length / step * (1 + kOfWhole))) + 1;
   MatrixXd grid(record.output.rows(), N);
   if (widths != nullptr) widths->resizeLike(grid);
   for (Index c = 0; c < grid.rows(); ++c) {
@@ -132,13 +140,13 @@ VectorXd first_noise(const std::vector<MotionRecord>& records, VectorXd* steps) 
       }
       hankel = std::min(hankel, unpredictable(record, c));
     }
-    // Pushes are in the last tenth. Of normal noise 90 % lies within 1.645 deviations.
+    // Pushes are in the last tenth.
     constexpr double kGain = 15.874507866387544;  // root of the coefficients' squares, 252
-    const double size = quantile(std::move(differences), 0.9) / 1.645 / kGain;
+    const double size = quantile(std::move(differences), kQuiet) / kQuietDeviations / kGain;
     // Differences see motion where samples are far apart. Digits are no closer than the least step.
     const double seen = hankel < size / 2 ? hankel : size;
     const double digit = std::isfinite(quantum) ? quantum / std::sqrt(12.0) : 0;
-    noise[c] = std::max({seen, digit, 1e-13 * largest, 1e-300});
+    noise[c] = std::max({seen, digit, kDigits * largest, kTiny});
     if (steps != nullptr && digit > seen) (*steps)[c] = digit;
   }
   return noise;
@@ -163,7 +171,7 @@ DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd&
   double highest = 0;
   for (std::size_t r = 0; most > 0 && r < grids.size(); ++r) {
     const double samples = kBand / 2 * static_cast<double>(grids[r].cols());
-    const auto lines = std::max<Index>(8, static_cast<Index>(samples));
+    const auto lines = std::max<Index>(kFewestLines, static_cast<Index>(samples));
     highest = std::max(highest, band_of_motion(grids[r], fine, sample_noise, lines));
   }
   if (kOversampled * highest * fine * static_cast<double>(per_cell) > std::numbers::pi) {
@@ -190,7 +198,8 @@ DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd&
     for (Index k = 0; k < cells; ++k) {
       const Index from = std::min(k * per_cell, grids[r].cols() - per_cell);
       for (Index c = 0; c < record.output.rows(); ++c) {
-        const auto wide = (gaps[r].row(c).segment(from, per_cell).array() > 2.5 * fine).count();
+        const auto wide =
+            (gaps[r].row(c).segment(from, per_cell).array() > kWideGap * fine).count();
         if (2 * wide > per_cell) record.output(c, k) = std::numeric_limits<double>::quiet_NaN();
       }
     }

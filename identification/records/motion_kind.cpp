@@ -1,4 +1,5 @@
 #include <dashpot/identification/motion_verdict.hpp>
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
 #include <dashpot/identification/records/motion_spectrum.hpp>
@@ -16,17 +17,14 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::ArrayXd;
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXcd;
-using Eigen::VectorXd;
-
 // Periods are periods of the pace.
 constexpr double kMovesMore = 2;      // times its noise: a channel that moves
 constexpr Index kPaces = 8;           // of a record, each with a pace of its own,
 constexpr Index kShortStretch = 100;  // of more samples than this
 constexpr Index kSmooth = 8;          // bins of a spectrum that count together
+constexpr double kAboveFloor = 3;     // times the noise's power: bins that count
+constexpr double kLastBin = 1e-4;     // rad over half a record: the frequency of a cycle is known
+constexpr Index kLagsOfPeriod = 8;    // part of it over which velocities are differences
 constexpr Index kFewestBlocks = 20;   // of a period: fewer do not show that motion lasts
 constexpr double kLasting = 0.9;   // share of the blocks of motion that lasts with motion in them
 constexpr double kFaded = 0.01;    // of the median energy: a block without motion
@@ -58,7 +56,7 @@ double pace_of_stretch(const MatrixXd& grid, double step, const VectorXd& noise)
           static_cast<double>(N) * std::pow(2 * std::sin(w * step / 2) * noise[c], 2);
       auto bins = power.segment(from, count);
       const double mean = bins.mean();
-      bins *= mean > 3 * floor ? (mean - floor) / mean : 0;
+      bins *= mean > kAboveFloor * floor ? (mean - floor) / mean : 0;
       all += bins.sum();
     }
     if (all > 0) sum += power / all;
@@ -133,7 +131,7 @@ bool cycles(const MatrixXd& scaled, double step, MotionVerdict& verdict) {
       std::max<Index>(1, static_cast<Index>(std::numbers::pi / (2 * w * (kHarmonics + 1))));
   const MatrixXd few = late(Eigen::seqN(0, half / stride, stride), Eigen::all);
   const auto s = static_cast<double>(stride);
-  for (; bin > 1e-4 / static_cast<double>(half); bin /= 2) {
+  for (; bin > kLastBin / static_cast<double>(half); bin /= 2) {
     const auto rest = [&](double x) { return CycleFit(x * s, 0, few).rest; };
     const double middle = rest(w);
     if (rest(w - bin) < middle) {
@@ -157,7 +155,7 @@ bool cycles(const MatrixXd& scaled, double step, MotionVerdict& verdict) {
 
 /// Whether something keeps a record's motion up throughout, and irregularly.
 bool lasts(const MatrixXd& scaled, Index period) {
-  const Index lag = std::max<Index>(1, period / 8), block = std::max<Index>(period, 4);
+  const Index lag = std::max<Index>(1, period / kLagsOfPeriod), block = std::max<Index>(period, 4);
   const Index blocks = (scaled.cols() - lag) / block;
   if (blocks < kFewestBlocks) return false;
   std::vector<double> energy;

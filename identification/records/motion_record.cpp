@@ -1,5 +1,5 @@
 #include <dashpot/identification/motion_record.hpp>
-#include <dashpot/identification/records/check_that.hpp>
+#include <dashpot/identification/records/common.hpp>
 
 #include <cmath>
 #include <string>
@@ -7,7 +7,8 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
+constexpr Index kSamples = 20;    ///< of a record, for a mode or two
+constexpr Index kOfChannel = 10;  ///< of one of its channels
 
 }  // namespace
 
@@ -27,7 +28,8 @@ void check_records(const std::vector<MotionRecord>& records) {
     const std::string name = "record " + std::to_string(r + 1) + ": ";
     check_that(output.rows() == channels && output.cols() == time.size(),
                name + "output has to be channels x samples, with as many channels as others");
-    check_that(time.size() >= 20, name + std::to_string(time.size()) + " samples, need 20 or more");
+    check_that(time.size() >= kSamples, name + std::to_string(time.size()) + " samples, need " +
+                                            std::to_string(kSamples) + " or more");
     check_that(time.allFinite(), name + "a time is not finite");
     check_that(input.size() == 0 || input.cols() == time.size(),
                name + "input has to be inputs x samples");
@@ -41,8 +43,9 @@ void check_records(const std::vector<MotionRecord>& records) {
         samples += std::isfinite(y);
         check_that(!std::isinf(y), name + "a sample is infinite");
       }
-      check_that(samples >= 10, name + "channel " + std::to_string(c + 1) + " has " +
-                                    std::to_string(samples) + " samples, need 10 or more");
+      check_that(samples >= kOfChannel, name + "channel " + std::to_string(c + 1) + " has " +
+                                            std::to_string(samples) + " samples, need " +
+                                            std::to_string(kOfChannel) + " or more");
     }
   }
 }

@@ -1,3 +1,4 @@
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/motion_spectrum.hpp>
 
 #include <unsupported/Eigen/FFT>
@@ -8,11 +9,12 @@
 
 namespace dashpot::identification {
 
-using Eigen::ArrayXd;
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXcd;
-using Eigen::VectorXd;
+namespace {
+
+constexpr Index kOnset = 20;       ///< part of a record over which its begin is made smooth
+constexpr double kStandsOut = 10;  ///< times the noise's power
+
+}  // namespace
 
 Index smooth_count(Index samples) {
   for (Index n = samples;; --n) {
@@ -37,7 +39,7 @@ VectorXd difference_power(const VectorXd& samples) {
 }
 
 double band_of_motion(const MatrixXd& grid, double step, const VectorXd& noise, Index lines) {
-  const Index begin = std::max<Index>(1, grid.cols() / 20);
+  const Index begin = std::max<Index>(1, grid.cols() / kOnset);
   const ArrayXd onset = ArrayXd::LinSpaced(begin, 0, std::numbers::pi / 2).sin().square();
   double band = 0;
   for (Index c = 0; c < grid.rows(); ++c) {
@@ -49,7 +51,7 @@ double band_of_motion(const MatrixXd& grid, double step, const VectorXd& noise, 
       const double w = width * (static_cast<double>(from) + 0.5 * static_cast<double>(lines));
       const double floor =
           static_cast<double>(grid.cols()) * std::pow(2 * std::sin(w * step / 2) * noise[c], 2);
-      if (power.segment(from, lines).mean() > 10 * floor) {
+      if (power.segment(from, lines).mean() > kStandsOut * floor) {
         band = std::max(band, width * static_cast<double>(from + lines));
       }
     }

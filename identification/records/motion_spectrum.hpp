@@ -8,6 +8,9 @@ namespace dashpot::identification {
 /// one.
 Eigen::VectorXd difference_power(const Eigen::VectorXd& samples);
 
+/// A channel that moves does so in as many lines of its spectrum, or more.
+inline constexpr Eigen::Index kFewestLines = 8;
+
 /// rad/s up to which some channel's motion stands out from its noise, by means of `lines` lines.
 double band_of_motion(const Eigen::MatrixXd& grid, double step, const Eigen::VectorXd& noise,
                       Eigen::Index lines);

@@ -1,3 +1,4 @@
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_spectrum.hpp>
 #include <dashpot/identification/records/steady_lines.hpp>
@@ -13,14 +14,10 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::ArrayXd;
-using Eigen::Index;
-using Eigen::MatrixXcd;
-using Eigen::MatrixXd;
-using Eigen::VectorXcd;
-using Eigen::VectorXd;
-
 constexpr Index kNear = 30;          // bins of the spectrum to each side
+constexpr Index kLeak = 3;           // bins to each side that a line leaks into
+constexpr Index kNeeded = 16;        // times kNear: samples in which a line is looked for
+constexpr double kOfBin = 1e-3;      // to which its frequency is searched
 constexpr double kOutstanding = 20;  // times their median
 constexpr Index kSteadyParts = 8;
 constexpr double kSteady = 0.7;      // of irregular motion, two in ten thousand reach it
@@ -51,13 +48,13 @@ Index outstanding(const ArrayXd& power, const std::vector<bool>& tried) {
   Index best = -1;
   double most = kOutstanding;
   std::vector<double> near;
-  for (Index k = 3; k + 3 < power.size(); ++k) {
+  for (Index k = kLeak; k + kLeak < power.size(); ++k) {
     if (tried[static_cast<std::size_t>(k)] || power[k] < power[k - 1] || power[k] < power[k + 1]) {
       continue;
     }
     near.clear();
     for (Index j = std::max<Index>(1, k - kNear); j < std::min(power.size(), k + kNear + 1); ++j) {
-      if (std::abs(j - k) > 3) near.push_back(power[j]);
+      if (std::abs(j - k) > kLeak) near.push_back(power[j]);
     }
     const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
     std::nth_element(near.begin(), middle, near.end());
@@ -85,7 +82,7 @@ double refined(const MatrixXd& scaled, double w, double bin, double step) {
   double a = w - bin, b = w + bin;
   double x = b - kGolden * (b - a), y = a + kGolden * (b - a);
   double at_x = size(x), at_y = size(y);
-  while (b - a > 1e-3 * bin) {
+  while (b - a > kOfBin * bin) {
     if (at_x > at_y) {
       b = y, y = x, at_y = at_x;
       at_x = size(x = b - kGolden * (b - a));
@@ -136,7 +133,7 @@ bool is_hum(const MatrixXd& scaled, const MatrixXcd& amplitudes) {
 
 std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step, bool of_decays) {
   std::vector<SteadyLine> lines;
-  if (grid.cols() < 16 * kNear) return lines;
+  if (grid.cols() < kNeeded * kNear) return lines;
   const VectorXd mean = grid.rowwise().mean();
   const VectorXd sizes =
       ((grid.colwise() - mean).rowwise().norm()).cwiseMax(std::numeric_limits<double>::min());

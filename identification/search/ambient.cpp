@@ -1,6 +1,7 @@
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/model/realization.hpp>
 #include <dashpot/identification/records/ambient_correlations.hpp>
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/search/measured_modes.hpp>
 #include <dashpot/identification/search/moving_channels.hpp>
 
@@ -13,11 +14,11 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXcd;
-using Eigen::VectorXd;
-
+/// Of the models without some part: a pole that may be the same (relative distance, modal assurance
+/// criterion). What a part moves further is another one.
+constexpr double kSamePole = 0.3, kSameShape = 0.5;
+/// Two modes a channel, and two of what else the forces prefer; more order by order takes long.
+constexpr int kOrdersOfChannel = 4, kMostOrders = 40;
 /// Student's 95 % quantile for 20 parts over that of the normal distribution.
 constexpr double kStudent = 2.09 / 1.96;
 
@@ -106,10 +107,10 @@ MeasuredMode to_mode(const RealizedPole& pole,
   std::vector<double> frequencies, ratios;
   for (const std::vector<RealizedPole>& poles : without) {
     const RealizedPole* nearest = nullptr;
-    double least = 0.3 * mode.natural_frequency;
+    double least = kSamePole * mode.natural_frequency;
     for (const RealizedPole& other : poles) {
       const double distance = std::abs(other.eigenvalue - lambda);
-      if (distance < least && likeness(other.shape, pole.shape) > 0.5) {
+      if (distance < least && likeness(other.shape, pole.shape) > kSameShape) {
         least = distance, nearest = &other;
       }
     }
@@ -140,18 +141,18 @@ MeasuredMode to_mode(const RealizedPole& pole,
 Identification identify_ambient(const std::vector<MotionRecord>& records,
                                 const IdentifyOptions& options) {
   check_records(records);
-  if (options.max_order < 0 || options.max_order > 60) {
-    throw std::invalid_argument("identify: max_order has to be within 0 and 60");
-  }
+  check_order(options);
   const MovingChannels moving(records);
   const AmbientCorrelations data(moving.records);
   const auto channels = static_cast<int>(data.sizes.size());
-  const int largest = options.max_order > 0 ? options.max_order : std::min(4 * channels + 4, 40);
+  const int largest = options.max_order > 0
+                          ? options.max_order
+                          : std::min(kOrdersOfChannel * (channels + 1), kMostOrders);
   Identification result;
   result.noise = data.noise;
   const Correlations all = data.mean([](std::size_t) { return true; });
   const Realization model(all, data.step, data.delays);
-  if (model.max_order() < 1) throw std::invalid_argument("identify: nothing moves");
+  check_that(model.max_order() >= 1, "nothing moves");
   double left = 0;
   result.order = order_of(data, std::min(largest, model.max_order()), left);
   result.explained = 1 - left;

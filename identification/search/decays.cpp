@@ -1,6 +1,6 @@
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/model/decay_columns.hpp>
-#include <dashpot/identification/records/check_that.hpp>
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/steady_lines.hpp>
 #include <dashpot/identification/search/measured_modes.hpp>
 #include <dashpot/identification/search/model_search.hpp>
@@ -16,12 +16,9 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXcd;
-using Eigen::MatrixXd;
-using Eigen::VectorXcd;
-using Eigen::VectorXd;
-
+constexpr double kCritical = 1e-9;  ///< of a frequency: closer eigenvalues have one shape
+/// Cells of all records, and of the shortest, beyond which the search is among the beginnings.
+constexpr double kSearched = 3000, kShortestSearched = 200;
 /// Noise, of the sensors' rounding: what is left over is its steps. Estimates of it scatter so
 /// much.
 constexpr double kRounds = 1.2;
@@ -37,7 +34,7 @@ VectorXcd shape_of(const DecayFactor& factor, const MatrixXd& amplitude) {
   }
   // e^{-a t / 2} (c cosh + s sinh / d), with d half of the difference of the eigenvalues.
   const double d = (lambda[0].real() - lambda[1].real()) / 2;
-  const double safe = std::abs(d) > 1e-9 * w ? d : 1e-9 * w;
+  const double safe = std::abs(d) > kCritical * w ? d : kCritical * w;
   return ((c + s / safe) / 2).cast<Complex>();
 }
 
@@ -115,11 +112,6 @@ VectorXd squares_of_motion(const MotionRecord& record) {
   return squares;
 }
 
-void check_order(const IdentifyOptions& options) {
-  check_that(options.max_order >= 0 && options.max_order <= 60,
-             "max_order has to be within 0 and 60");
-}
-
 Identification describe(const FoundModel& found, const std::vector<MotionRecord>& records) {
   Identification result;
   result.noise = found.fit.noise;
@@ -142,7 +134,7 @@ Identification describe(const FoundModel& found, const std::vector<MotionRecord>
     step = std::min(step, length / static_cast<double>(record.time.size() - 1));
     scale += squares_of_motion(record);
   }
-  scale = scale.cwiseMax(1e-300);
+  scale = scale.cwiseMax(kTiny);
   result.explained = 1 - rest.cwiseQuotient(scale).mean();
   std::vector<MeasuredMode> modes;
   Index at = 0;
@@ -202,9 +194,8 @@ Identification identify_excited(const std::vector<MotionRecord>& records,
     count += record.time.size();
     shortest = std::min(shortest, record.time.size());
   }
-  constexpr double kSearched = 3000, kLeast = 200;  // cells: the search is among the beginnings
-  const double share =
-      std::max(kSearched / static_cast<double>(count), kLeast / static_cast<double>(shortest));
+  const double share = std::max(kSearched / static_cast<double>(count),
+                                kShortestSearched / static_cast<double>(shortest));
   if (share >= 1) return moving.of_all(describe(find_model(cells, options), cells.records));
   std::vector<MotionRecord> beginnings;
   for (const MotionRecord& record : moving.records) {

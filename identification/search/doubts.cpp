@@ -1,5 +1,5 @@
+#include <dashpot/identification/model/realization.hpp>
 #include <dashpot/identification/search/doubts.hpp>
-#include <dashpot/identification/search/measured_modes.hpp>
 
 #include <algorithm>
 #include <array>
@@ -9,39 +9,38 @@ namespace dashpot::identification {
 namespace {
 
 // Of what is left over.
-constexpr double kNotWhite = 2;   ///< whiteness of what is no noise
-constexpr double kMuch = 0.1;     ///< of the motion: more is left over than a model of it leaves
-constexpr double kPoor = 0.01;    ///< of the motion: modes of one order may make up for the rest
-constexpr double kLittle = 1e-3;  ///< of the motion: less is left over of what is linear
-constexpr double kOfRest = 0.3;   ///< energy, of what is left over: such a mode may be part of it
+constexpr double kNotWhite = 2;   ///< whiteness: beyond it the rest is no noise of sensors
+constexpr double kMuch = 0.1;     ///< of the motion: more than the noise of inputs leaves over
+constexpr double kPoor = 0.01;    ///< of the motion: modes of one order may make up for as much
+constexpr double kLittle = 1e-3;  ///< of the motion: a model that several records share is right
+constexpr double kOfRest = 0.3;   ///< energy, of the rest: so weak a mode may be a piece of it
 constexpr double kLightly = 0.1;  ///< damping ratio: friction does not make such a mode by itself
 constexpr double kBeside = 0.1;   ///< energy, of the strongest lightly damped: friction makes less
 // Of the records.
-constexpr double kFewestParts = 0.8;    ///< share of them that must have a mode
-constexpr double kLeastRatio = 0.001;   ///< damping ratio of what decays
-constexpr double kUndetermined = 0.05;  ///< relative deviation of what the records do not tell
+constexpr double kFewestParts = 0.8;    ///< share that has a mode: fewer give no spread of it
+constexpr double kLeastRatio = 0.001;   ///< damping ratio: what something moves has less
+constexpr double kUndetermined = 0.05;  ///< relative deviation: more tells no mode from others
 constexpr double kUndeterminedInDecays = 0.06;  ///< more, because that of one decay is widened
-constexpr double kTurn = 2.5;  ///< rad from sample to sample: close to half a turn, and aliases
-constexpr double kSeenTurn =
-    3;  ///< rad of oscillation that a record has to have, about half a turn,
-constexpr double kSeenDecay = 1;  ///< or of decay, as an exponent
-// Of energy: shares of the motion.
-constexpr double kMostEnergy = 100;    ///< of what is no difference of modes that cancel
-constexpr double kLeastEnergy = 1e-6;  ///< to 1e-3 of itself, the motion of an arm is not linear
+constexpr double kTurn = 2.5;     ///< rad from sample to sample: beyond pi it would be another one
+constexpr double kSeenTurn = 3;   ///< rad: about half a turn has to be in the record,
+constexpr double kSeenDecay = 1;  ///< or a decay to 1 / e
+// Energy, as a share of the motion.
+constexpr double kMostEnergy = 100;    ///< more is the difference of modes that cancel
+constexpr double kLeastEnergy = 1e-6;  ///< a thousandth of the size: no arm is so linear
 /// Other orders miss heavily damped modes, but no lightly damped one that is there.
 constexpr double kAloneWeak = 1e-3, kLightlyAloneWeak = 3e-3;
 constexpr double kCounts = 1e-3;  ///< less, rejected, says nothing of a model
 // Of modes beside each other.
-constexpr double kLikeShapes = 0.8;  ///< modal assurance criterion: one motion
-constexpr double kNextTo = 0.05;     ///< relative distance: a frequency that changes with its size
-constexpr double kLarger = 2;        ///< energy of the mode whose change another is
-constexpr double kTwice = 0.2, kTwiceDeviations = 4;  ///< distance of what may be one mode twice
-constexpr double kSure = 2;      ///< deviations, beyond which nothing is by chance
-constexpr double kHarmonic = 3;  ///< of friction and other odd forces; sums tell even ones
-constexpr double kExplains = 5;  ///< energy, over a mode's: what is not linear is weaker than that
+constexpr double kLikeShapes = 0.8;  ///< modal assurance criterion: shapes of one motion
+constexpr double kNextTo = 0.05;     ///< relative distance: a frequency changes so with its size
+constexpr double kLarger = 2;        ///< energy: of two alike the weaker one is the change
+constexpr double kTwice = 0.2, kTwiceDeviations = 4;  ///< distance of one mode found twice
+constexpr double kSure = 2;            ///< deviations: what is beyond is not by chance
+constexpr double kHarmonic = 3;        ///< of odd forces, as friction; sums tell even ones
+constexpr double kExplains = 5;        ///< energy, over a mode's: what is not linear is weaker
 constexpr double kCoincides = 0.002;   ///< relative: what is not linear moves larger modes, too
-constexpr double kHasHarmonics = 0.3;  ///< damping ratio of what lasts long enough to have some
-constexpr double kWhite = 1.5;         ///< whiteness of what may be noise
+constexpr double kHasHarmonics = 0.3;  ///< damping ratio: what is over at once has none
+constexpr double kWhite = 1.5;         ///< whiteness: below it the rest is noise, and all is told
 
 bool not_white(const Evidence& e) {
   return e.records.whiteness > kNotWhite;

@@ -1,4 +1,5 @@
 #include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
 #include <dashpot/identification/records/steady_lines.hpp>
@@ -13,10 +14,6 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 constexpr double kMoves = 3;   // in units of the noise
 constexpr double kStrong = 5;  // worth a decay
 constexpr double kRise = 3;    // a new push
@@ -26,7 +23,18 @@ constexpr double kEnvelope = 1.5;  // window
 // Times over which positions are compared, of which the first that shows a push counts: over short
 // ones fast motion shows, over long ones slow motion stands out of more noise.
 constexpr std::array kLags = {0.025, 0.1, 0.4, 1.6};
-constexpr Index kLeast = 20;  // samples of a decay
+constexpr Index kLeast = 20;         // samples of a decay
+constexpr Index kRestPart = 10;      // part of an event at its end, where the arm rests
+constexpr double kTop = 0.97;        // of the largest energy: the same, but for noise
+constexpr Index kStepsOfWindow = 8;  // of the envelope
+constexpr double kBegins = 1.5;      // times the least speed before it: a push
+// Where a decay may begin: points of its rise, and shares of what follows its peak.
+constexpr int kRisePoints = 6;
+constexpr std::array kAfterPeak = {0.0, 0.02, 0.05, 0.1, 0.2, 0.3};
+// Large motions are not linear, but what decays fast is seen in them only: what is left over is
+// worse by kMore (logarithm) than from the best start on, beyond kEnough of the motion.
+constexpr double kEnough = 1e-3, kMore = 0.03;
+constexpr double kSeen = 8;  // times the noise: motion of a decay
 
 /// How fast the channels move: root mean square of differences over `lag`, in units of their noise.
 VectorXd speed_of(const MatrixXd& grid, const VectorXd& noise, Index lag) {
@@ -49,7 +57,7 @@ VectorXd speed_of(const MatrixXd& grid, const VectorXd& noise, Index lag) {
 /// The point from which an event may be free: the last at which its energy, or what stands for it,
 /// is at its top. The kinetic part is scaled so that both parts are equal on the whole.
 Index top_of_energy(const MatrixXd& grid, const VectorXd& size, Index from, Index to, Index lag) {
-  const Index quiet = std::max<Index>(1, (to - from) / 10);
+  const Index quiet = std::max<Index>(1, (to - from) / kRestPart);
   const VectorXd rest = grid.middleCols(to - quiet, quiet).rowwise().mean();
   const Index N = to - from - lag;
   VectorXd potential(N), kinetic(N);
@@ -58,8 +66,8 @@ Index top_of_energy(const MatrixXd& grid, const VectorXd& size, Index from, Inde
     potential[k] = ((here + there) / 2 - rest).cwiseQuotient(size).squaredNorm();
     kinetic[k] = (there - here).cwiseQuotient(size).squaredNorm();
   }
-  const VectorXd energy = potential + kinetic * (potential.sum() / std::max(1e-300, kinetic.sum()));
-  const double top = 0.97 * energy.maxCoeff();
+  const VectorXd energy = potential + kinetic * (potential.sum() / std::max(kTiny, kinetic.sum()));
+  const double top = kTop * energy.maxCoeff();
   for (Index k = N; k-- > 0;) {
     if (energy[k] >= top) return from + k;
   }
@@ -82,7 +90,7 @@ void add_events(const VectorXd& speed, Index begin, Index end, Index window,
     return speed.segment(from, to - from).maxCoeff();
   };
   Index start = begin;
-  for (Index k = begin; k < end; k += std::max<Index>(1, window / 8)) {
+  for (Index k = begin; k < end; k += std::max<Index>(1, window / kStepsOfWindow)) {
     const double now = envelope(k);
     if (!falling) {
       if (now >= speed[peak]) {
@@ -98,7 +106,7 @@ void add_events(const VectorXd& speed, Index begin, Index end, Index window,
     if (now > kRise * std::max(least, kMoves)) {
       // Begins before the envelope says so, which looks ahead.
       Index rise = std::min(end - 1, low + window / 2);
-      while (rise > low && speed[rise] > 1.5 * least) --rise;
+      while (rise > low && speed[rise] > kBegins * least) --rise;
       events.push_back({start, peak, rise});
       start = rise, peak = rise, falling = false;
       k = rise;
@@ -167,14 +175,11 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
                    Index to) {
   FreeDecay decay{peak, to, {}};
   std::vector<Index> starts;
-  starts.reserve(12);
-  for (int k = 0; k < 6; ++k) starts.push_back(from + (peak - from) * k / 6);
-  for (const double share : {0.0, 0.02, 0.05, 0.1, 0.2, 0.3}) {
+  for (int k = 0; k < kRisePoints; ++k) starts.push_back(from + (peak - from) * k / kRisePoints);
+  for (const double share : kAfterPeak) {
     starts.push_back(peak + static_cast<Index>(share * static_cast<double>(to - peak)));
   }
   starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
-  // Large motions are not linear, but what decays fast is seen in them only.
-  constexpr double kEnough = 1e-3, kMore = 0.03, kSeen = 8;
   // Digits that do not change are no motion without noise.
   const VectorXd enough = (kEnough * motion_of(part_of(record, from, to))).cwiseMax(noise);
   // Mean logarithm of what a model leaves over from a start on; none where too little follows.

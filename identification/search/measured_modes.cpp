@@ -5,28 +5,19 @@
 
 namespace dashpot::identification {
 
-using Eigen::Index;
-using Eigen::VectorXcd;
-
-double likeness(const VectorXcd& u, const VectorXcd& v) {
-  return std::norm(u.dot(v)) / std::max(1e-300, u.squaredNorm() * v.squaredNorm());
-}
-
-VectorXcd turned(const VectorXcd& shape) {
-  Index largest = 0;
-  shape.cwiseAbs().maxCoeff(&largest);
-  const double size = std::abs(shape[largest]);
-  if (size == 0) return shape;
-  return (shape * (std::conj(shape[largest]) / size)).normalized();
-}
-
 namespace {
+
+// A pole is stable that the model of one order less has within these; users know them.
+constexpr double kStableFrequency = 0.01, kStableRatio = 0.02, kStableShape = 0.95;
+// A model of another order has a mode within these: relative, deviations, and likeness.
+constexpr double kHasIt = 0.05, kHasItDeviations = 2, kHasItShape = 0.9;
+constexpr double kPairShapes = 0.9;  ///< likeness of single eigenvalues of one overdamped mode
 
 bool same_pole(const RealizedPole& a, const RealizedPole& b) {
   const double wa = modulus(a.eigenvalue), wb = modulus(b.eigenvalue);
-  return std::abs(wa - wb) < 0.01 * wb &&
-         std::abs(a.eigenvalue.real() / wa - b.eigenvalue.real() / wb) < 0.02 &&
-         likeness(a.shape, b.shape) > 0.95;
+  return std::abs(wa - wb) < kStableFrequency * wb &&
+         std::abs(a.eigenvalue.real() / wa - b.eigenvalue.real() / wb) < kStableRatio &&
+         likeness(a.shape, b.shape) > kStableShape;
 }
 
 /// Replaces single eigenvalues of like shapes by one overdamped mode.
@@ -36,7 +27,7 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
   };
   for (;;) {
     std::size_t best_i = 0, best_j = 0;
-    double best = 0.9;
+    double best = kPairShapes;
     for (std::size_t i = 0; i < modes.size(); ++i) {
       for (std::size_t j = i + 1; j < modes.size(); ++j) {
         if (!single(modes[i]) || !single(modes[j])) continue;
@@ -108,9 +99,9 @@ double stability_of(const MeasuredMode& mode,
           std::any_of(mode.eigenvalues.begin(), mode.eigenvalues.end(), [&](const Complex& lambda) {
             const double size = std::abs(lambda);
             return std::abs(pole.eigenvalue - lambda) <
-                   std::max(0.05 * size, 2 * mode.natural_frequency_std);
+                   std::max(kHasIt * size, kHasItDeviations * mode.natural_frequency_std);
           });
-      if (!near || likeness(pole.shape, mode.shape) < 0.9) continue;
+      if (!near || likeness(pole.shape, mode.shape) < kHasItShape) continue;
       ++having;
       break;
     }

@@ -8,12 +8,6 @@
 
 namespace dashpot::identification {
 
-/// |u' v|^2 / (|u|^2 |v|^2), the modal assurance criterion.
-double likeness(const Eigen::VectorXcd& u, const Eigen::VectorXcd& v);
-
-/// Returns the shape with unit length, its largest entry real and positive.
-Eigen::VectorXcd turned(const Eigen::VectorXcd& shape);
-
 /// A hum that was taken away, as a mode that is not believed.
 MeasuredMode to_mode(const SteadyLine& hum);
 

@@ -1,4 +1,5 @@
 // Changes of a model: more factors, other ones, or fewer.
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/search/model_changes.hpp>
 
 #include <algorithm>
@@ -8,9 +9,6 @@
 
 namespace dashpot::identification {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
 
 /// A change of the model is given up where -2 log likelihood will stay larger by this. With 60,
 /// searches among heavily damped modes give up models that become the best ones.

@@ -1,6 +1,7 @@
 // Compares parts of the records with the model of the whole, and says how sure that is.
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
-#include <dashpot/identification/search/model_changes.hpp>
+#include <dashpot/identification/search/model_parts.hpp>
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -10,10 +11,6 @@
 
 namespace dashpot::identification {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 /// Parts that are stretches of time, as shares of a record.
 constexpr std::array<std::pair<double, double>, 3> kWindows = {
@@ -94,7 +91,7 @@ std::size_t contradicted(const Search& search, const DecayFit& whole,
           excess += d * d / own - 1, weights += 1 / own;
         }
       }
-      if (count > 1 && chi > count - 1 + 3 * std::sqrt(2 * (count - 1))) {
+      if (count > 1 && chi > count - 1 + kDeviations * std::sqrt(2 * (count - 1))) {
         variance += excess / weights * size * size;
       }
     }

@@ -1,8 +1,10 @@
 #include <dashpot/identification/model/common_denominator.hpp>
 #include <dashpot/identification/model/decay_columns.hpp>
-#include <dashpot/identification/records/check_that.hpp>
+#include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/search/model_changes.hpp>
+#include <dashpot/identification/search/model_parts.hpp>
+#include <dashpot/identification/search/model_search.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +13,6 @@
 
 namespace dashpot::identification {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 constexpr SearchLimits kOfDecays{.rows = 300, .worse = 6, .iterations = 30, .added = 6};
 /// Of models of rising order in a first estimate, which nothing is added to.
@@ -33,6 +31,7 @@ constexpr double kDrifts = 3;
 /// decays at most so many for each cell and channel.
 constexpr Index kLeastOrder = 12, kMostOrder = 32, kOrdersOfInputs = 16, kCellsOfOrder = 4;
 constexpr int kOrdersOfRest = 2;  ///< what is left over is looked at for one motion at a time
+constexpr Index kBeginning = 8;   ///< part of the records, where fast decays are
 constexpr Index kRowsOfRest = 100, kColumnsOfRest = 10;  ///< of its Hankel matrix, most, and least
 constexpr int kSearchedOn = 4;       ///< factors more, for a model that is larger
 constexpr double kOrdersDone = 0.5;  ///< share of the search that is done then, for progress
@@ -41,7 +40,7 @@ constexpr double kOrdersDone = 0.5;  ///< share of the search that is done then,
 std::vector<std::vector<RealizedPole>> rest_poles(const std::vector<MatrixXd>& rest, double step,
                                                   Index channels) {
   std::vector<std::vector<RealizedPole>> result;
-  for (const Index part : {1, 8}) {
+  for (const Index part : {Index{1}, kBeginning}) {
     std::vector<MatrixXd> beginning;
     for (const MatrixXd& record : rest) {
       const Index columns = record.cols() / part;

@@ -7,7 +7,8 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
+constexpr double kRounding = 1e-9;  ///< of the largest range
+constexpr int kLargestModel = 60;   ///< eigenvalues
 
 bool moves(const MotionRecord& record, Index channel) {
   double first = std::numeric_limits<double>::quiet_NaN();
@@ -29,12 +30,17 @@ std::vector<Index> moving_inputs(const std::vector<MotionRecord>& records) {
   }
   std::vector<Index> moving;
   for (Index i = 0; i < range.size(); ++i) {
-    if (range[i] > 1e-9 * range.maxCoeff()) moving.push_back(i);
+    if (range[i] > kRounding * range.maxCoeff()) moving.push_back(i);
   }
   return moving;
 }
 
 }  // namespace
+
+void check_order(const IdentifyOptions& options) {
+  check_that(options.max_order >= 0 && options.max_order <= kLargestModel,
+             "max_order has to be within 0 and " + std::to_string(kLargestModel));
+}
 
 MovingChannels::MovingChannels(const std::vector<MotionRecord>& all)
     : records(all), count_(all.front().output.rows()) {
@@ -43,7 +49,7 @@ MovingChannels::MovingChannels(const std::vector<MotionRecord>& all)
     for (const MotionRecord& record : all) any = any || moves(record, c);
     if (any) channels.push_back(c);
   }
-  if (channels.empty()) throw std::invalid_argument("identify: nothing moves");
+  check_that(!channels.empty(), "nothing moves");
   const std::vector<Index> inputs = moving_inputs(all);
   for (MotionRecord& record : records) {
     record.output = Eigen::MatrixXd(record.output(channels, Eigen::all));

@@ -38,6 +38,39 @@ inline std::vector<std::string> described_rooms(const std::string& text) {
   return found;
 }
 
+/// The constants that a source names kLikeThis, with their values: "kLimit = 3".
+inline std::vector<std::string> named_constants(const std::string& text) {
+  static const std::regex statement(R"re(\bconstexpr\b[^;{}]*;)re");
+  static const std::regex constant(R"re(\bk[A-Z]\w* = [^,;]+)re");
+  std::vector<std::string> found;
+  for (std::sregex_iterator at(text.begin(), text.end(), statement), end; at != end; ++at) {
+    const std::string code = at->str();
+    for (std::sregex_iterator one(code.begin(), code.end(), constant); one != end; ++one) {
+      found.push_back(one->str());
+    }
+  }
+  return found;
+}
+
+/// The same of the tables in a section of a document: | `kLimit`, `kOther` | 3, 4 | why |.
+inline std::vector<std::string> tabled_constants(const std::string& text,
+                                                 const std::string& section) {
+  static const std::regex line(R"re(\n\| (`k[A-Z][^|]*) \| ([^|]*) \|)re");
+  static const std::regex name(R"re(`(\w+)`)re"), value(R"re([^, ][^,]*)re");
+  const std::size_t begin = std::min(text.find("\n## " + section + "\n"), text.size());
+  const std::string part = text.substr(begin, text.find("\n## ", begin + 1) - begin);
+  std::vector<std::string> found;
+  for (std::sregex_iterator at(part.begin(), part.end(), line), end; at != end; ++at) {
+    const std::string names = (*at)[1], values = (*at)[2];
+    std::sregex_iterator of(values.begin(), values.end(), value);
+    for (std::sregex_iterator one(names.begin(), names.end(), name); one != end && of != end;
+         ++one, ++of) {
+      found.push_back((*one)[1].str() + " = " + of->str());
+    }
+  }
+  return found;
+}
+
 inline bool starts_with_pragma_once(std::string_view text) {
   return text.starts_with("#pragma once\n");
 }

@@ -33,6 +33,16 @@ TEST(DocumentRules, FindTheRoomsThatATableDescribes) {
   EXPECT_THAT(described_rooms("| `a/base` | types |\n"), IsEmpty());
 }
 
+TEST(ConstantRules, FindConstantsInSourcesAndTables) {
+  EXPECT_THAT(named_constants("constexpr double kA = 1e-3, kBc = 2;  // why\n  static constexpr\n"
+                              "Index kD =\n 4; const double kE = 5; x = kA;"),
+              ElementsAre("kA = 1e-3", "kBc = 2"));
+  EXPECT_THAT(tabled_constants("## One\n| `kA` | 1 | a |\n## Two\n| name | value |\n|---|---|\n"
+                               "| `kB`, `kC` | 2, 1 / 3 | b, c |\n## Three\n| `kD` | 4 | d |\n",
+                               "Two"),
+              ElementsAre("kB = 2", "kC = 1 / 3"));
+}
+
 TEST(HeaderRules, AskForPragmaOnceInTheFirstLine) {
   EXPECT_TRUE(starts_with_pragma_once("#pragma once\n#include <vector>\n"));
   EXPECT_FALSE(starts_with_pragma_once("// A comment.\n#pragma once\n"));

@@ -113,6 +113,21 @@ std::string text_of(const std::string& path) {
   return file == nullptr ? "" : file->text;
 }
 
+TEST(Documents, ListTheConstantsOfIdentificationWithTheirValues) {
+  const std::vector<std::string> listed =
+      tabled_constants(text_of("docs/constants.md"), "Identification");
+  std::size_t count = 0;
+  for (const File& file : files()) {
+    if (!file.path.starts_with("identification/")) continue;
+    for (const std::string& constant : named_constants(file.text)) {
+      if (constant.starts_with("kNaN")) continue;
+      EXPECT_THAT(listed, Contains(constant)) << file.path;
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 150U);
+}
+
 TEST(Examples, TheProgramOfTheReadmeIsTheOneThatIsTested) {
   const std::string readme = text_of("README.md"), fence = "```cpp\n";
   const std::size_t begin = readme.find(fence);
