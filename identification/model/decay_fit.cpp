@@ -288,17 +288,20 @@ std::vector<MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,
   return result;
 }
 
-double energy_of(const DecayData& data, const DecayFit& fit, std::size_t factor) {
-  double energy = 0;
-  const std::vector<MatrixXd> motion = factor_motion(data, fit, factor);
+double squares_of(const DecayData& data, const std::vector<MatrixXd>& motion,
+                  const VectorXd& scale) {
+  double sum = 0;
   for (std::size_t i = 0; i < motion.size(); ++i) {
     const auto& channels = data.parts[i].channels;
     for (std::size_t c = 0; c < channels.size(); ++c) {
-      energy +=
-          motion[i].col(static_cast<Index>(c)).squaredNorm() / std::pow(fit.noise[channels[c]], 2);
+      sum += motion[i].col(static_cast<Index>(c)).squaredNorm() / scale[channels[c]];
     }
   }
-  return energy;
+  return sum;
+}
+
+double energy_of(const DecayData& data, const DecayFit& fit, std::size_t factor) {
+  return squares_of(data, factor_motion(data, fit, factor), fit.noise.cwiseAbs2());
 }
 
 std::vector<MatrixXd> left_over(const DecayData& data, const DecayFit& fit) {

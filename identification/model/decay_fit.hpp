@@ -48,7 +48,11 @@ std::vector<Eigen::MatrixXd> factor_motion(const DecayData& data, const DecayFit
                                            std::size_t factor);
 std::vector<Eigen::MatrixXd> left_over(const DecayData& data, const DecayFit& fit);
 
-/// The squares of that part, in units of the noise.
+/// The sum of the squares of such motion, those of each channel in units of its `scale`.
+double squares_of(const DecayData& data, const std::vector<Eigen::MatrixXd>& motion,
+                  const Eigen::VectorXd& scale);
+
+/// The squares of a factor's part, in units of the noise.
 double energy_of(const DecayData& data, const DecayFit& fit, std::size_t factor);
 
 }  // namespace dashpot::identification

@@ -6,8 +6,6 @@
 #include <dashpot/identification/records/steady_lines.hpp>
 
 #include <Eigen/QR>
-#include <unsupported/Eigen/FFT>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -101,16 +99,8 @@ struct CycleFit {
 /// The frequency, rad a sample, of the strongest line of samples x channels.
 double strongest_line(const MatrixXd& samples) {
   const Index N = smooth_count(samples.rows());
-  VectorXd power = VectorXd::Zero(N / 2);
-  const VectorXd taper = 0.5 - 0.5 * VectorXd::LinSpaced(N, 0, 2 * std::numbers::pi).array().cos();
-  Eigen::FFT<double> fft;
-  VectorXcd lines;
-  for (Index c = 0; c < samples.cols(); ++c) {
-    const VectorXd shown =
-        (samples.col(c).head(N).array() - samples.col(c).head(N).mean()) * taper.array();
-    fft.fwd(lines, shown);
-    power += lines.head(N / 2).cwiseAbs2();
-  }
+  const MatrixXd used = samples.topRows(N).transpose();
+  const ArrayXd power = tapered_power(used.colwise() - VectorXd(used.rowwise().mean()));
   Index top = 0;
   power.tail(power.size() - 1).maxCoeff(&top);
   return 2 * std::numbers::pi * static_cast<double>(top + 1) / static_cast<double>(N);

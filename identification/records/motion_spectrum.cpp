@@ -38,6 +38,24 @@ VectorXd difference_power(const VectorXd& samples) {
   return lines.segment(1, std::max<Index>(1, N / 2 - 1)).cwiseAbs2();
 }
 
+ArrayXd taper_of(Index samples) {
+  return 0.5 - 0.5 * ArrayXd::LinSpaced(samples, 0, 2 * std::numbers::pi).cos();
+}
+
+ArrayXd tapered_power(const MatrixXd& channels) {
+  const Index N = smooth_count(channels.cols());
+  const ArrayXd taper = taper_of(N);
+  ArrayXd power = ArrayXd::Zero(N / 2);
+  Eigen::FFT<double> fft;
+  VectorXcd spectrum;
+  for (Index c = 0; c < channels.rows(); ++c) {
+    const VectorXd shown = channels.row(c).head(N).transpose().array() * taper;
+    fft.fwd(spectrum, shown);
+    power += spectrum.head(N / 2).array().abs2();
+  }
+  return power;
+}
+
 double band_of_motion(const MatrixXd& grid, double step, const VectorXd& noise, Index lines) {
   const Index begin = std::max<Index>(1, grid.cols() / kOnset);
   const ArrayXd onset = ArrayXd::LinSpaced(begin, 0, std::numbers::pi / 2).sin().square();

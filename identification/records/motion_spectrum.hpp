@@ -8,6 +8,13 @@ namespace dashpot::identification {
 /// one.
 Eigen::VectorXd difference_power(const Eigen::VectorXd& samples);
 
+/// A window, the square of half a sine, of as many samples.
+Eigen::ArrayXd taper_of(Eigen::Index samples);
+
+/// The power of channels x samples through the taper, summed over the channels, by frequency bins
+/// from 0; of as many samples as a fast Fourier transform is fast of.
+Eigen::ArrayXd tapered_power(const Eigen::MatrixXd& channels);
+
 /// A channel that moves does so in as many lines of its spectrum, or more.
 inline constexpr Eigen::Index kFewestLines = 8;
 

@@ -24,25 +24,6 @@ constexpr double kSteady = 0.7;      // of irregular motion, two in ten thousand
 constexpr double kSteadyHum = 0.95;  // in the second half of a decay
 constexpr int kMostLines = 20;
 
-ArrayXd taper_of(Index samples) {
-  return 0.5 - 0.5 * ArrayXd::LinSpaced(samples, 0, 2 * std::numbers::pi).cos();
-}
-
-/// The power of all channels by frequency bins, each channel in units of its size.
-ArrayXd power_of(const MatrixXd& scaled) {
-  const Index N = smooth_count(scaled.cols());
-  const ArrayXd taper = taper_of(N);
-  ArrayXd power = ArrayXd::Zero(N / 2);
-  Eigen::FFT<double> fft;
-  VectorXcd spectrum;
-  for (Index c = 0; c < scaled.rows(); ++c) {
-    const VectorXd shown = scaled.row(c).head(N).transpose().array() * taper;
-    fft.fwd(spectrum, shown);
-    power += spectrum.head(N / 2).array().abs2();
-  }
-  return power;
-}
-
 /// The bin that stands out most; -1 if none does.
 Index outstanding(const ArrayXd& power, const std::vector<bool>& tried) {
   Index best = -1;
@@ -138,7 +119,7 @@ std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step, bool of_d
   const VectorXd sizes =
       ((grid.colwise() - mean).rowwise().norm()).cwiseMax(std::numeric_limits<double>::min());
   MatrixXd scaled = sizes.cwiseInverse().asDiagonal() * (grid.colwise() - mean);
-  ArrayXd power = power_of(scaled);
+  ArrayXd power = tapered_power(scaled);
   std::vector<bool> tried(static_cast<std::size_t>(power.size()));
   const double bin = std::numbers::pi / (static_cast<double>(power.size()) * step);
   while (static_cast<int>(lines.size()) < kMostLines) {
@@ -162,7 +143,7 @@ std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step, bool of_d
     lines.push_back({w, VectorXcd(grid.rows())});
     lines.back().size.real() = sizes.cwiseProduct(shares.row(0).transpose());
     lines.back().size.imag() = sizes.cwiseProduct(shares.row(1).transpose());
-    power = power_of(scaled);
+    power = tapered_power(scaled);
   }
   if (!lines.empty()) grid = (sizes.asDiagonal() * scaled).colwise() + mean;
   return lines;

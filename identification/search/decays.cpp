@@ -64,15 +64,7 @@ MeasuredMode to_mode(const FoundModel& found, std::size_t k, Index at, const Vec
     mode.damping_ratio = factor.first < 0 ? 1 : -1;
     mode.damping_ratio_std = std::numeric_limits<double>::infinity();
   }
-  double energy = 0;
-  const std::vector<MatrixXd> motion = factor_motion(found.data, fit, k);
-  for (std::size_t i = 0; i < motion.size(); ++i) {
-    const auto& channels = found.data.parts[i].channels;
-    for (std::size_t c = 0; c < channels.size(); ++c) {
-      energy += motion[i].col(static_cast<Index>(c)).squaredNorm() / scale[channels[c]];
-    }
-  }
-  mode.energy = energy / all;
+  mode.energy = squares_of(found.data, factor_motion(found.data, fit, k), scale) / all;
   mode.shape = turned(shape_of(factor, fit.amplitudes.middleRows(at, factor.parameters())));
   return mode;
 }

@@ -40,8 +40,8 @@ struct Search {
 /// Returns as factors the poles that a record of this length (s) can tell from a constant.
 std::vector<DecayFactor> factors_of(const std::vector<RealizedPole>& poles, double duration);
 
-/// Each of these changes the model found as described, if that explains the cells better, and
-/// returns whether it did.
+/// Each of these changes the model found, if that explains the cells better; the first two return
+/// whether it did.
 bool add_from_rest(Search& search);  ///< one factor more, of what is left over
 bool split_one(Search& search);      ///< two factors in place of one
 void drop_useless(Search& search);   ///< factors, and halves of them, until all count

@@ -1,13 +1,16 @@
 // Each rule by which a mode is not believed decides on either side of its limits, by itself.
 #include <dashpot/identification/search/doubts.hpp>
 #include <dashpot/tests/identification/good_mode.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -267,6 +270,17 @@ TEST(Doubts, AreAllTestedAndHaveNamesAndWordsOfTheirOwn) {
 TEST(Doubts, SayNothingOfAGoodMode) {
   for (const Stage stage : {Stage::kParts, Stage::kLeftOver, Stage::kMode, Stage::kTogether}) {
     EXPECT_THAT(holding(stage, {}), IsEmpty());
+  }
+}
+
+TEST(Doubts, StandInTheirOrderInTheDocumentation) {
+  std::ifstream file(DASHPOT_SOURCE_DIR "/docs/identify.md");
+  std::stringstream text;
+  text << file.rdbuf();
+  std::size_t at = 0;
+  for (const Rule& rule : doubts()) {
+    at = text.str().find("\n| " + std::string(rule.words) + " | ", at);
+    ASSERT_NE(at, std::string::npos) << rule.words;
   }
 }
 
