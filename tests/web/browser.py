@@ -100,7 +100,7 @@ class Browser:
             raise RuntimeError(str(answer['exceptionDetails']))
         return answer['result'].get('value')
 
-    def until(self, expression, seconds=120):
+    def until(self, expression, seconds=1200):
         """Waits until an expression is true; raises RuntimeError if it does not become so."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -112,7 +112,7 @@ class Browser:
                            + str(self.value('JSON.stringify(window.dashpot?.errors)')))
 
     @staticmethod
-    def eventually(check, seconds=120):
+    def eventually(check, seconds=1200):
         """Returns what `check` returns as soon as it raises no AssertionError."""
         end = time.monotonic() + seconds
         while True:

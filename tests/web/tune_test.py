@@ -499,7 +499,7 @@ class Tune(unittest.TestCase):
 
     def test_workspace_shows_the_worst_postures(self):
         self.edit("state.a = {...state.a, stiffness: [200, 200, 200, 20, 20, 20], damping: {factor: 2}}")
-        self.browser.until('dashpot.workspace.found.a.postures >= 2000', 120)
+        self.browser.until('dashpot.workspace.found.a.postures >= 2000')
         worst = self.value('dashpot.workspace.found.a.worst.smallest_ratio.value')
         self.browser.until("$('#worst button').textContent.startsWith('A: worst ratio')")
         self.value("$('#worst button').click()")
@@ -521,7 +521,7 @@ class Tune(unittest.TestCase):
                 return real(path, options); }; })()""")
         for i in range(3):
             self.edit(f"state.b.stiffness[0] = {300 + i}")
-        self.browser.until('early.length > 2', 120)
+        self.browser.until('early.length > 2')
         self.assertEqual(self.value('early.filter(Boolean).length'), 0)
 
     def test_discussion_of_the_paper_by_hand(self):

@@ -64,7 +64,7 @@ def main(program, source, folder):
                     break
                 click(page)
                 clicks += 1
-            page.until('dashpot.workspace.found.b.postures >= 2000', 120)
+            page.until('dashpot.workspace.found.b.postures >= 2000')
             page.value('new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))')
             picture(page, os.path.join(folder, 'tune.png'), 'arm_panel', 'table_panel', 0.55)
             for row in page.value('dashpot.answers.a.system.task_damping'):
