@@ -14,7 +14,7 @@ PANDA, CONFIG = ROOT / "sim/models/panda.urdf", ROOT / "controller/examples/pand
 
 def run(name, *arguments):
     done = subprocess.run([sys.executable, "-B", ROOT / "python/examples" / name, *arguments],
-                          capture_output=True, text=True, timeout=300)
+                          capture_output=True, text=True, timeout=1200)
     assert done.returncode == 0, done.stderr
     assert "nanobind" not in done.stderr
     return done.stdout

@@ -63,7 +63,7 @@ def follow(name, heading, needs, **replaced):
                 continue
             done = subprocess.run(["bash", "-c", exports + command], cwd=ROOT, env=environment,
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                                  timeout=300, check=False)
+                                  timeout=1200, check=False)
             assert done.returncode == 0, done.stdout
             squeezed = (" ".join(text.split()) for text in (output, done.stdout))
             assert doctest.OutputChecker().check_output(*squeezed, doctest.ELLIPSIS), \

@@ -43,7 +43,7 @@ def said_by_page(program, config, q):
         host = server.stdout.readline().split("/")[2]
 
         def ask(method, path, body=None, **headers):
-            connection = http.client.HTTPConnection(host, timeout=60)
+            connection = http.client.HTTPConnection(host, timeout=1200)
             connection.request(method, path, body, headers)
             return json.loads(connection.getresponse().read())
 

@@ -101,7 +101,7 @@ def start(*arguments):
 
 def end(process, status=0):
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=1200)
     assert process.returncode == status, out + err
     return out
 

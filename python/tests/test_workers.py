@@ -161,7 +161,7 @@ def test_mpi_finds_the_same(panda, region, tmp_path):
     (tmp_path / "program.py").write_text(MPI)
     (tmp_path / "in").write_bytes(pickle.dumps((panda, GAINS, REGION)))
     done = subprocess.run([mpiexec, "-n", "3", sys.executable, "-m", "mpi4py.futures", "program.py",
-                           "in", "out"], cwd=tmp_path, capture_output=True, text=True, timeout=120,
+                           "in", "out"], cwd=tmp_path, capture_output=True, text=True, timeout=1200,
                           env={**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1",
                                "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                                "OMPI_MCA_rmaps_base_oversubscribe": "1"})

@@ -30,7 +30,7 @@ class Server:
         self.setup = json.loads(self.ask('GET', '/setup')[1])
 
     def ask(self, method, path, body=None, **headers):
-        connection = http.client.HTTPConnection(self.host, timeout=60)
+        connection = http.client.HTTPConnection(self.host, timeout=1200)
         connection.request(method, path, body, headers)
         answer = connection.getresponse()
         found = answer.status, answer.read()
