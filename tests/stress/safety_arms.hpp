@@ -20,110 +20,34 @@ struct TestArm {
   const char* tip;
   double reflected_inertia;   ///< kg m^2 or kg, each joint: simulated, and known to the controller
   std::vector<double> start;  ///< rad or m, well within the limits
-  int joint;                  ///< that is taken out of its limits, slips, ...
-  int light;                  ///< the revolute one with the least inertia
-  const char* limits;         ///< lines under `limits` for plugins whose defaults do not fit it
   bool named_only = false;    ///< only in scenarios that name it
+
+  static constexpr int joint = 0;  ///< that is taken out of its limits, slips, ...
+  /// The revolute one with the least inertia: before the finger, or the last.
+  int light() const { return start.size() == 5 ? 3 : static_cast<int>(start.size()) - 1; }
 };
 
 inline const std::vector<TestArm>& test_arms() {
+  static const std::vector<double> franka = {0, -0.785, 0, -2.356, 0, 1.571, 0.785},
+                                   iiwa = {0, 0.524, 0, -1.396, 0, 1.047, 0},
+                                   ur = {0, -1.222, 1.571, -1.920, -1.571, 0},
+                                   xarm = {0, -0.3, 0, 0.8, 0, 1.1, 0},
+                                   lift = {0.4, 0.5, -1.0, 0.3, 0.02},
+                                   gen3 = {0, 0.26, 3.14, -2.27, 0, 0.96, 1.57},
+                                   baxter = {0, -0.55, 0, 0.75, 0, 1.26, 0};
   static const std::vector<TestArm> all = {
-      {"panda",
-       "panda",
-       "panda_link0",
-       "panda_hand_tcp",
-       0,
-       {0, -0.785, 0, -2.356, 0, 1.571, 0.785},
-       0,
-       6,
-       ""},
-      {"iiwa14",
-       "iiwa14",
-       "iiwa_link_0",
-       "iiwa_link_ee_kuka",
-       0,
-       {0, 0.524, 0, -1.396, 0, 1.047, 0},
-       0,
-       6,
-       ""},
-      {"iiwa14+rotors",
-       "iiwa14",
-       "iiwa_link_0",
-       "iiwa_link_ee_kuka",
-       0.1,
-       {0, 0.524, 0, -1.396, 0, 1.047, 0},
-       0,
-       6,
-       ""},
-      {"iiwa7",
-       "iiwa7",
-       "iiwa_link_0",
-       "iiwa_link_ee_kuka",
-       0,
-       {0, 0.524, 0, -1.396, 0, 1.047, 0},
-       0,
-       6,
-       ""},
-      {"fr3",
-       "fr3",
-       "fr3_link0",
-       "fr3_hand_tcp",
-       0,
-       {0, -0.785, 0, -2.356, 0, 1.571, 0.785},
-       0,
-       6,
-       ""},
-      {"panda+rotors",
-       "panda",
-       "panda_link0",
-       "panda_hand_tcp",
-       0.1,
-       {0, -0.785, 0, -2.356, 0, 1.571, 0.785},
-       0,
-       6,
-       "",
-       true},
-      {"xarm7", "xarm7", "link_base", "link_eef", 0, {0, -0.3, 0, 0.8, 0, 1.1, 0}, 0, 6, ""},
-      {"ur5", "ur5", "base_link", "ee_link", 0, {0, -1.222, 1.571, -1.920, -1.571, 0}, 0, 5, ""},
-      {"lift+gripper",
-       "lift_gripper",
-       "base",
-       "fingertip",
-       0,
-       {0.4, 0.5, -1.0, 0.3, 0.02},
-       0,
-       3,
-       ""},
-      {"ur10e",
-       "ur10e",
-       "base_link",
-       "tool0",
-       0,
-       {0, -1.222, 1.571, -1.920, -1.571, 0},
-       0,
-       5,
-       "",
-       true},
-      {"gen3",
-       "gen3",
-       "base_link",
-       "end_effector_link",
-       0,
-       {0, 0.26, 3.14, -2.27, 0, 0.96, 1.57},
-       0,
-       6,
-       "",
-       true},
-      {"baxter",
-       "baxter_left",
-       "left_arm_mount",
-       "left_gripper",
-       0,
-       {0, -0.55, 0, 0.75, 0, 1.26, 0},
-       0,
-       6,
-       "",
-       true},
+      {"panda", "panda", "panda_link0", "panda_hand_tcp", 0, franka},
+      {"iiwa14", "iiwa14", "iiwa_link_0", "iiwa_link_ee_kuka", 0, iiwa},
+      {"iiwa14+rotors", "iiwa14", "iiwa_link_0", "iiwa_link_ee_kuka", 0.1, iiwa},
+      {"iiwa7", "iiwa7", "iiwa_link_0", "iiwa_link_ee_kuka", 0, iiwa},
+      {"fr3", "fr3", "fr3_link0", "fr3_hand_tcp", 0, franka},
+      {"panda+rotors", "panda", "panda_link0", "panda_hand_tcp", 0.1, franka, true},
+      {"xarm7", "xarm7", "link_base", "link_eef", 0, xarm},
+      {"ur5", "ur5", "base_link", "ee_link", 0, ur},
+      {"lift+gripper", "lift_gripper", "base", "fingertip", 0, lift},
+      {"ur10e", "ur10e", "base_link", "tool0", 0, ur, true},
+      {"gen3", "gen3", "base_link", "end_effector_link", 0, gen3, true},
+      {"baxter", "baxter_left", "left_arm_mount", "left_gripper", 0, baxter, true},
   };
   return all;
 }
@@ -163,6 +87,14 @@ inline sim::Robot simulated_robot(const TestArm& arm, sim::RobotParameters param
   }
   return sim::Robot::from_file(std::string(DASHPOT_SOURCE_DIR "/sim/models/") + arm.file + ".urdf",
                                arm.base, arm.tip, parameters);
+}
+
+inline JointVector limits_of(const TestArm& arm, double sim::Joint::*limit) {
+  const sim::Robot robot = simulated_robot(arm);
+  JointVector values(robot.dof());
+  for (int i = 0; i < robot.dof(); ++i)
+    values[i] = robot.joints()[static_cast<std::size_t>(i)].*limit;
+  return values;
 }
 
 }  // namespace dashpot::stress

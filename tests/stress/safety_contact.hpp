@@ -7,15 +7,21 @@
 
 namespace dashpot::stress {
 
-constexpr const char* kCartesian = "control: {mode: cartesian}\n";
+/// The tip is held, at first where the arm starts.
+inline RigOptions cartesian(const JointVector& start = {}) {
+  RigOptions options;
+  options.config = "control: {mode: cartesian}\n";
+  options.start = start;
+  return options;
+}
 
 /// The tip is to go `depth` below a table that stands 3 cm below it, a springy one without friction
 /// in the arm if it is `smooth`.
 inline Act table(double depth, bool smooth = false) {
   return [=](const PluginFile& plugin, const TestArm& arm, Row& row) {
-    RigOptions options;
-    options.config = std::string(kCartesian) + "gains:\n  task: {stiffness: [1500, 1500, 1500, " +
-                     (smooth ? "80, 80, 80" : "30, 30, 30") + "], damping_ratio: 0.7}\n";
+    RigOptions options = cartesian();
+    options.config += std::string("gains:\n  task: {stiffness: [1500, 1500, 1500, ") +
+                      (smooth ? "80, 80, 80" : "30, 30, 30") + "], damping_ratio: 0.7}\n";
     sim::Wall wall;
     wall.point = sim::Arm(simulated_robot(arm)).tip_pose(start_of(arm)).position;
     wall.point.z() -= 0.03;
@@ -42,9 +48,7 @@ inline void default_moves(const PluginFile& plugin, const TestArm& arm, Row& row
   int faults = 0, missed = 0;
   Measures worst;
   for (int move = 0; move < kMoves; ++move) {
-    RigOptions options;
-    options.config = kCartesian;
-    options.start = start_of(arm);
+    RigOptions options = cartesian(start_of(arm));
     JointVector to = options.start;
     const sim::Robot robot = simulated_robot(arm);
     for (int i = 0; i < robot.dof(); ++i) {
@@ -72,13 +76,10 @@ inline void default_moves(const PluginFile& plugin, const TestArm& arm, Row& row
 
 /// The tip goes to the pose of a posture that is not far, by way of a joint limit.
 inline void past_a_limit(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  RigOptions options;
-  options.config = kCartesian;
-  options.start.resize(7);
-  options.start << -0.882, -0.915, -0.314, -1.785, 1.04, 2.137, 1.217;
-  JointVector to(7);
+  JointVector from(7), to(7);
+  from << -0.882, -0.915, -0.314, -1.785, 1.04, 2.137, 1.217;
   to << -2, -0.095, -2, -2.265, 1.843, 1.859, 2;
-  Rig rig(plugin, arm, options);
+  Rig rig(plugin, arm, cartesian(from));
   rig.goal = Goal::at(rig.tip_at(to));
   rig.run(6);
   row.finish(rig, {1, false, true});
@@ -87,10 +88,7 @@ inline void past_a_limit(const PluginFile& plugin, const TestArm& arm, Row& row)
 
 /// Upright, and pulled outward.
 inline void upright(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  RigOptions options;
-  options.config = kCartesian;
-  options.start = JointVector::Constant(start_of(arm).size(), 0.01);
-  Rig rig(plugin, arm, options);
+  Rig rig(plugin, arm, cartesian(JointVector::Constant(start_of(arm).size(), 0.01)));
   rig.goal = Goal::at(rig.tip_at(rig.position()));
   rig.goal->tip.position.x() += 0.4;
   rig.run(6);
@@ -100,9 +98,7 @@ inline void upright(const PluginFile& plugin, const TestArm& arm, Row& row) {
 
 /// Straight out, to 10 cm beyond where the arm ends.
 inline void stretched(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  RigOptions options;
-  options.config = kCartesian;
-  Rig rig(plugin, arm, options);
+  Rig rig(plugin, arm, cartesian());
   rig.goal = Goal::at(rig.tip_at(rig.position()));
   Eigen::Vector3d out = rig.goal->tip.position;
   out.z() = 0;
@@ -114,14 +110,12 @@ inline void stretched(const PluginFile& plugin, const TestArm& arm, Row& row) {
 
 /// Commands within what is accepted: hard springs without damping, and a goal that alternates.
 inline void stiff_undamped(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  RigOptions options;
-  options.config = kCartesian;
-  Rig rig(plugin, arm, options);
+  Rig rig(plugin, arm, cartesian());
   rig.run(0.1);
   const Eigen::MatrixXd D = Eigen::MatrixXd::Zero(6, 6);
   Eigen::MatrixXd K = D;
   K.diagonal() << 50000, 50000, 50000, 500, 500, 500;
-  const bool taken = rig.set_task_gains(K, D) == DASHPOT_OK;
+  const bool taken = rig.set_gains(K, D, true) == DASHPOT_OK;
   rig.goal = Goal::at(rig.tip_at(rig.position()));
   const Eigen::Vector3d middle = rig.goal->tip.position;
   for (int i = 0; i < 12; ++i) {
@@ -133,14 +127,12 @@ inline void stiff_undamped(const PluginFile& plugin, const TestArm& arm, Row& ro
 }
 
 inline void over_damped(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  RigOptions options;
-  options.config = kCartesian;
-  Rig rig(plugin, arm, options);
+  Rig rig(plugin, arm, cartesian());
   rig.run(0.1);
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(6, 6), D = K;
   K.diagonal() << 1000, 1000, 1000, 50, 50, 50;
   D.diagonal() << 5000, 5000, 5000, 5000, 5000, 5000;
-  const bool taken = rig.set_task_gains(K, D) == DASHPOT_OK;
+  const bool taken = rig.set_gains(K, D, true) == DASHPOT_OK;
   rig.run(3);
   row.finish(rig, {1.5, true, true});
   row.note = taken ? "gains taken" : "gains refused";
@@ -191,12 +183,8 @@ inline void untold_weight(const PluginFile& plugin, const TestArm& arm, Row& row
 /// Every torque limit at half of the largest weight.
 inline void too_weak(const PluginFile& plugin, const TestArm& arm, Row& row) {
   RigOptions options;
-  const sim::Robot robot = simulated_robot(arm);
   const double heaviest = Rig(plugin, arm, {}).weight(start_of(arm)).cwiseAbs().maxCoeff();
-  JointVector most(robot.dof());
-  for (int i = 0; i < robot.dof(); ++i) {
-    most[i] = std::min(0.5 * heaviest, robot.joints()[static_cast<std::size_t>(i)].effort);
-  }
+  const JointVector most = limits_of(arm, &sim::Joint::effort).cwiseMin(0.5 * heaviest);
   options.limits = "  torque: " + yaml_list(most) + "\n";
   Rig rig(plugin, arm, options);
   rig.run(4);

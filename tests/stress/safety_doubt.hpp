@@ -9,12 +9,7 @@ namespace dashpot::stress {
 /// Stops from 0.9 of the limits of all joints at a gap, and says what energy it put in.
 inline void stop_all(const PluginFile& plugin, const TestArm& arm, RigOptions options,
                      const std::function<void(Rig&)>& spoil, const Bounds& bounds, Row& row) {
-  options.start = start_of(arm);
-  const sim::Robot robot = simulated_robot(arm);
-  options.velocity.resize(robot.dof());
-  for (int i = 0; i < robot.dof(); ++i) {
-    options.velocity[i] = 0.9 * robot.joints()[static_cast<std::size_t>(i)].velocity;
-  }
+  options.velocity = 0.9 * limits_of(arm, &sim::Joint::velocity);
   options.world.viscous_friction = options.world.coulomb_friction = false;
   Rig rig(plugin, arm, options);
   spoil(rig);

@@ -42,14 +42,6 @@ inline int elbow_of(const TestArm& arm) {
   return arm.start.size() == 7 ? 3 : 2;
 }
 
-inline JointVector limits_of(const TestArm& arm, double sim::Joint::*limit) {
-  const sim::Robot robot = simulated_robot(arm);
-  JointVector values(robot.dof());
-  for (int i = 0; i < robot.dof(); ++i)
-    values[i] = robot.joints()[static_cast<std::size_t>(i)].*limit;
-  return values;
-}
-
 inline RigOptions options_of(const TestArm& arm, const Variant& variant) {
   const JointVector torque = limits_of(arm, &sim::Joint::effort);
   const controller::Drives& drives =

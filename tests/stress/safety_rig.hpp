@@ -25,16 +25,15 @@ namespace dashpot::stress {
 
 /// What a rig is made of; what is left out is the arm's own.
 struct RigOptions {
-  std::string robot;            ///< YAML lines under `robot`
-  std::string config;           ///< YAML lines beside `robot`, `limits` and `analysis`
-  std::string limits;           ///< lines under `limits`
-  bool defaults_alone = false;  ///< not the arm's lines there
-  JointVector start;            ///< rad or m
-  JointVector velocity;         ///< rad/s or m/s
-  sim::ArmOptions world;        ///< wall, pushes; stops are added
-  sim::PlantOptions plant;      ///< sensors, and their faults
-  double velocity_step = 0;     ///< of the velocities that are measured, rad/s or m/s
-  sim::RobotParameters truth;   ///< of the robot; without reflected inertias it has the arm's own
+  std::string robot;           ///< YAML lines under `robot`
+  std::string config;          ///< YAML lines beside `robot`, `limits` and `analysis`
+  std::string limits;          ///< lines under `limits`
+  JointVector start;           ///< rad or m
+  JointVector velocity;        ///< rad/s or m/s
+  sim::ArmOptions world;       ///< wall, pushes; stops are added
+  sim::PlantOptions plant;     ///< sensors, and their faults
+  double velocity_step = 0;    ///< of the velocities that are measured, rad/s or m/s
+  sim::RobotParameters truth;  ///< of the robot; without reflected inertias it has the arm's own
   std::optional<testing::MujocoOptions> mujoco;  ///< which moves the robot then
   bool told_weight = true;  ///< dashpot_reset with the weight before the first tick
   double told_rotors = 0;   ///< kg m^2 (kg) each that the controller alone knows of
@@ -85,8 +84,8 @@ class Rig {
   /// Throws std::runtime_error with the plugin's words if it refuses the configuration.
   Rig(const PluginFile& plugin, const TestArm& arm, const RigOptions& options)
       : plugin_(plugin),
-        config_(controller::load_config(write_config(arm, options, options.limits))),
-        controller_(make_controller(arm, options), plugin.destroy),
+        config_(controller::load_config(write_config(arm, options))),
+        controller_(plugin.create(write_config(arm, options).c_str()), plugin.destroy),
         velocity_step_(options.velocity_step),
         body_(simulated_robot(arm, options.truth), with_stops(options.world)) {
     unlink(path_.c_str());
@@ -149,21 +148,13 @@ class Rig {
     first_tip_ = body_.tip_pose(position()).position;
   }
 
-  /// Returns what dashpot_set_gains does. Empty matrices are not given.
-  std::int32_t set_joint_gains(const Eigen::MatrixXd& K, const Eigen::MatrixXd& D) {
+  /// Returns what dashpot_set_gains does: of the joints, or of the tip.
+  std::int32_t set_gains(const Eigen::MatrixXd& K, const Eigen::MatrixXd& D, bool task = false) {
     dashpot_gains gains{};
     gains.struct_size = sizeof gains;
     gains.joints = n_;
-    gains.joint_stiffness = K.data();
-    gains.joint_damping = D.data();
-    return plugin_.set_gains(controller_.get(), &gains);
-  }
-  std::int32_t set_task_gains(const Eigen::MatrixXd& K, const Eigen::MatrixXd& D) {
-    dashpot_gains gains{};
-    gains.struct_size = sizeof gains;
-    gains.joints = n_;
-    gains.task_stiffness = K.data();
-    gains.task_damping = D.data();
+    (task ? gains.task_stiffness : gains.joint_stiffness) = K.data();
+    (task ? gains.task_damping : gains.joint_damping) = D.data();
     return plugin_.set_gains(controller_.get(), &gains);
   }
   void reset(const JointVector* torque) {
@@ -204,17 +195,7 @@ class Rig {
     world.stops = sim::Contact{2000, 20};
     return world;
   }
-  /// A controller for these options, with the arm's own limits where the plugin knows them.
-  dashpot_controller* make_controller(const TestArm& arm, const RigOptions& options) {
-    dashpot_controller* result = nullptr;
-    if (!options.defaults_alone) {
-      result = plugin_.create(write_config(arm, options, arm.limits + options.limits).c_str());
-    }
-    if (result != nullptr) return result;
-    return plugin_.create(write_config(arm, options, options.limits).c_str());
-  }
-  std::string write_config(const TestArm& arm, const RigOptions& options,
-                           const std::string& limits) {
+  std::string write_config(const TestArm& arm, const RigOptions& options) {
     if (path_.empty()) {
       char name[] = "/tmp/dashpot_safety.XXXXXX.yaml";
       const int file = mkstemps(name, 5);
@@ -224,7 +205,8 @@ class Rig {
     }
     std::ofstream(path_) << robot_yaml(arm, options.told_rotors) << options.robot
                          << "analysis: {where: off}\n"
-                         << options.config << (limits.empty() ? "" : "limits:\n") << limits;
+                         << options.config << (options.limits.empty() ? "" : "limits:\n")
+                         << options.limits;
     return path_;
   }
 

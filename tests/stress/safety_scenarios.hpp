@@ -15,10 +15,7 @@ inline JointVector moved(JointVector q, int joint, double by) {
 
 /// Limits of which the upper one of one joint lies at `upper`.
 inline std::string upper_limit(const TestArm& arm, int joint, double upper) {
-  const sim::Robot robot = simulated_robot(arm);
-  JointVector limits(robot.dof());
-  for (int i = 0; i < robot.dof(); ++i)
-    limits[i] = robot.joints()[static_cast<std::size_t>(i)].upper;
+  JointVector limits = limits_of(arm, &sim::Joint::upper);
   limits[joint] = upper;
   return "  position_upper: " + yaml_list(limits) + "\n";
 }
@@ -38,8 +35,7 @@ inline Act outside(double by_angle, double by_length, double speed) {
     options.start[joint] = upper + by;
     options.limits = upper_limit(arm, joint, upper);
     options.velocity = JointVector::Zero(options.start.size());
-    options.velocity[joint] =
-        -speed * simulated_robot(arm).joints()[static_cast<std::size_t>(joint)].velocity;
+    options.velocity[joint] = -speed * limits_of(arm, &sim::Joint::velocity)[joint];
     Rig rig(plugin, arm, options);
     rig.run(0.002);
     const double at_first = rig.seen.kinetic_energy;
@@ -61,14 +57,14 @@ inline Eigen::Vector3d axis_of(Rig& rig, int joint, const JointVector& q) {
 /// Ordinary springs draw the light joint to its limit, through what pushes it back from there.
 inline void light_joint_pressed(const PluginFile& plugin, const TestArm& arm, Row& row) {
   RigOptions options;
-  const JointVector to = moved(start_of(arm), arm.light, 0.3);
-  options.limits = upper_limit(arm, arm.light, to[arm.light] + 1e-3);
+  const JointVector to = moved(start_of(arm), arm.light(), 0.3);
+  options.limits = upper_limit(arm, arm.light(), to[arm.light()] + 1e-3);
   Rig rig(plugin, arm, options);
   const auto there = controller::evaluate(rig.model(), to, JointVector::Zero(to.size()));
   Eigen::MatrixXd K = Eigen::MatrixXd::Identity(to.size(), to.size()) * 200, D = 0 * K;
-  K(arm.light, arm.light) = 2 * rig.limits().torque[arm.light];
+  K(arm.light(), arm.light()) = 2 * rig.limits().torque[arm.light()];
   D.diagonal() = 1.4 * K.diagonal().cwiseProduct(Eigen::VectorXd(there.M.diagonal())).cwiseSqrt();
-  const bool taken = rig.set_joint_gains(K, D) == DASHPOT_OK;
+  const bool taken = rig.set_gains(K, D) == DASHPOT_OK;
   rig.goal = Goal::joints(to);
   rig.run(5);
   row.finish(rig, {1, true, true});
@@ -79,11 +75,11 @@ inline void light_joint_pressed(const PluginFile& plugin, const TestArm& arm, Ro
 /// A hand guides the light joint past its limit and lets go.
 inline void light_joint_let_go(const PluginFile& plugin, const TestArm& arm, Row& row) {
   RigOptions options;
-  const double upper = arm.start[static_cast<std::size_t>(arm.light)] + 0.3;
-  options.limits = upper_limit(arm, arm.light, upper);
+  const double upper = arm.start[static_cast<std::size_t>(arm.light())] + 0.3;
+  options.limits = upper_limit(arm, arm.light(), upper);
   Rig rig(plugin, arm, options);
   rig.run(0.2);
-  rig.guide(moved(rig.position(), arm.light, 0.35), 1.5);
+  rig.guide(moved(rig.position(), arm.light(), 0.35), 1.5);
   rig.run(4);
   row.finish(rig, {1, true, true});
   row.require(row.seen.return_share <= kSlowReturn, "thrown back");
@@ -94,7 +90,6 @@ inline void finger_at_rest(const PluginFile& plugin, const TestArm& arm, Row& ro
   RigOptions options;
   options.start = start_of(arm);
   options.start[4] = 0.01;
-  options.defaults_alone = true;
   Rig rig(plugin, arm, options);
   rig.run(4);
   row.finish(rig, {0.5, true, true});
@@ -132,7 +127,7 @@ inline void unstable_gains(const PluginFile& plugin, const TestArm& arm, Row& ro
   rig.run(0.2);
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(rig.n(), rig.n());
   const double damping = 100 + 2000 * arm.reflected_inertia;  // the limit is about 2 M / T
-  const bool taken = rig.set_joint_gains(100 * one, damping * one) == DASHPOT_OK;
+  const bool taken = rig.set_gains(100 * one, damping * one) == DASHPOT_OK;
   rig.run(4);
   row.finish(rig, {1.5, true, true});
   row.note = (taken ? "gains taken; " : "gains refused; ") + std::to_string(row.seen.changes) +
@@ -211,12 +206,12 @@ inline void hard_jolts(const PluginFile& plugin, const TestArm& arm, Row& row) {
   RigOptions options;
   {
     Rig rig(plugin, arm, options);
-    const Eigen::Vector3d axis = axis_of(rig, arm.light, q);
+    const Eigen::Vector3d axis = axis_of(rig, arm.light(), q);
     const auto there = controller::evaluate(rig.model(), q, JointVector::Zero(q.size()));
     const Eigen::VectorXd unit = there.J.bottomRows<3>().transpose() * axis;
     const Eigen::VectorXd acceleration = Eigen::MatrixXd(there.M).ldlt().solve(unit);
     controller::Vector6 jolt = controller::Vector6::Zero();
-    jolt.tail<3>() = 1200 * rig.limits().velocity[arm.light] / acceleration[arm.light] * axis;
+    jolt.tail<3>() = 1200 * rig.limits().velocity[arm.light()] / acceleration[arm.light()] * axis;
     options.world.wrenches = {{0.5, 0.501, jolt / 2}};
     for (int i = 1; i < 150; ++i) {
       const double at = 0.5 + 0.001 * i;
@@ -237,19 +232,15 @@ inline void hard_jolts(const PluginFile& plugin, const TestArm& arm, Row& row) {
 inline Act stop_from(double share, bool all) {
   return [=](const PluginFile& plugin, const TestArm& arm, Row& row) {
     RigOptions options;
-    options.start = start_of(arm);
-    const sim::Robot robot = simulated_robot(arm);
-    options.velocity = JointVector::Zero(robot.dof());
-    for (int i = 0; i < (all ? robot.dof() : 1); ++i) {
-      options.velocity[i] = share * robot.joints()[static_cast<std::size_t>(i)].velocity;
-    }
+    options.velocity = share * limits_of(arm, &sim::Joint::velocity);
+    if (!all) options.velocity.tail(options.velocity.size() - 1).setZero();
     options.world.viscous_friction = options.world.coulomb_friction = false;
     Rig rig(plugin, arm, options);
     rig.run(rig.period());
     rig.skip_time(0.02);
     const JointVector from = rig.position();
     double slow = -1;  // s, when all were slower than a tenth for good
-    Eigen::VectorXd way = Eigen::VectorXd::Zero(robot.dof());
+    Eigen::VectorXd way = Eigen::VectorXd::Zero(rig.n());
     for (int tick = 0; tick < 2000; ++tick) {
       rig.run(rig.period());
       const JointVector speed = rig.plant().velocity().cwiseQuotient(rig.limits().velocity);

@@ -67,11 +67,8 @@ class Work {
     if (!controller_) throw std::runtime_error(dashpot_last_error());
     const sim::Robot model = stress::simulated_robot(arm);
     const auto n = static_cast<Eigen::Index>(model.joints().size());
-    fastest_ = strongest_ = home_;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      fastest_[i] = model.joints()[static_cast<std::size_t>(i)].velocity;
-      strongest_[i] = model.joints()[static_cast<std::size_t>(i)].effort;
-    }
+    fastest_ = stress::limits_of(arm, &sim::Joint::velocity);
+    strongest_ = stress::limits_of(arm, &sim::Joint::effort);
     start_ = sim::Arm(model).tip_pose(home_);
     for (int i = 0; i < rounds; ++i)
       rounds_.push_back(stress::draw_round(engine, static_cast<int>(n)));

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
 #include <vector>
 
 namespace dashpot::testing {
@@ -27,6 +28,19 @@ class BallMatrix {
 
   acb_ptr at(Eigen::Index i, Eigen::Index j) { return acb_mat_entry_ptr(balls_, i, j); }
   acb_mat_struct* get() { return balls_; }
+  /// The centres of the balls, which have to be thin.
+  Eigen::MatrixXcd rounded() {
+    const auto part = [](const arb_t ball) {
+      const double center = arf_get_d(arb_midref(ball), ARF_RND_NEAR);
+      if (!(mag_get_d(arb_radref(ball)) <= 1e-18 * std::abs(center) + 1e-101)) {
+        throw std::runtime_error("too few bits");
+      }
+      return center;
+    };
+    return Eigen::MatrixXcd::NullaryExpr(balls_->r, balls_->c, [&](Eigen::Index i, Eigen::Index j) {
+      return analysis::Complex(part(acb_realref(at(i, j))), part(acb_imagref(at(i, j))));
+    });
+  }
 
  private:
   acb_mat_t balls_;
