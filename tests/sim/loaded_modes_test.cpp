@@ -3,7 +3,6 @@
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/base/orientation.hpp>
-#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 
@@ -34,8 +33,7 @@ struct World {
   Load load = Load::kBaseWrench;
   Vector6 wrench = Vector6::Zero();
   Environment environment;
-  std::optional<sim::Wall> wall;             ///< all of both comes from it
-  Vector6 posture_wrench = Vector6::Zero();  ///< with which the tip holds the pull of the posture
+  std::optional<sim::Wall> wall;  ///< all of both comes from it
 };
 
 /// An arm at rest at q0, where its springs hold the load.
@@ -104,13 +102,6 @@ class LoadedArm {
     setpoint_.tip_pose.position += e.head<3>();
     setpoint_.tip_pose.rotation =
         controller::quaternion(Eigen::Vector3d(e.tail<3>())).toRotationMatrix() * rest_.R_BT;
-    if (gains.null_stiffness.isZero(0)) return;
-    // q_0 - q = s J# e + p, where K_0 p is a pull that the springs of the tip hold.
-    const MatrixXd M = rest_.M, J = rest_.J, A = J * M.llt().solve(J.transpose());
-    const VectorXd share = M.llt().solve(J.transpose() * A.llt().solve(e));
-    const VectorXd pull = J.transpose() * world_.posture_wrench;
-    setpoint_.joint_position += share / std::sqrt(1 + share.squaredNorm() / 0.09) +
-                                pull.cwiseQuotient(VectorXd(gains.null_stiffness));
   }
   /// Torques at the joints that the simulator's arm does not have by itself.
   JointVector outside(const JointVector& q, const JointVector& qd) const {
@@ -302,71 +293,6 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
       "%s, seeds 1 to 3: frequency within %.1e, ratio within %.1e; %.2g of K is the load's\n",
       param.name, worst.frequency, worst.ratio, moved);
   EXPECT_GT(moved, 1e-3);
-}
-
-class LoadedPostures : public ::testing::TestWithParam<testing::Arm> {};
-INSTANTIATE_TEST_SUITE_P(SevenJoints, LoadedPostures, ::testing::ValuesIn([] {
-                           const std::vector<testing::Arm> all = testing::all_arms();
-                           return std::vector{all[0], all[1], all[5], all[6], all[7]};
-                         }()),
-                         [](const auto& instance) { return std::string(instance.param.file); });
-
-/// Arms with a joint too many, whose posture springs pull while the tip holds a steady wrench.
-TEST_P(LoadedPostures, HaveTheModesOfTheSimulatedMotion) {
-  const TwinModels twin(GetParam());
-  const int n = twin.dof();
-  testing::Worst worst;
-  double moved = 0;
-  for (int seed = 1; seed <= 2; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(static_cast<std::uint64_t>(seed));
-    const JointVector q0 = random_posture(twin, random);
-    const auto robot = evaluate(twin.model, q0, JointVector::Zero(n));
-    controller::Gains gains = tip_gains(twin, q0, kOmega, kZeta, 0.3, random);
-    const VectorXd u = testing::self_motion(twin, q0);
-    gains.null_stiffness = VectorXd(robot.M.diagonal());
-    gains.null_stiffness *= 49 / u.dot(gains.null_stiffness.cwiseProduct(u));
-    gains.null_damping = 0.08 * gains.null_stiffness;
-    controller::Settings settings = loaded_settings(twin, gains, Load::kBaseWrench);
-    settings.limits.gain_margin = 1;
-    settings.motion.velocity.setConstant(2);
-    World world = empty_world(Load::kBaseWrench, n);
-    world.wrench = random_wrench(gains.task_stiffness, random);
-    world.posture_wrench = random.vector(6);
-    const VectorXd p =
-        (robot.J.transpose() * world.posture_wrench).cwiseQuotient(VectorXd(gains.null_stiffness));
-    world.posture_wrench *= 0.4 / p.cwiseAbs().maxCoeff();
-
-    LoadedArm arm(twin, settings, q0, world);
-    const testing::StateFit fit = fit_of(arm, settings.period, n, 4000, random);
-    ASSERT_EQ(fit.modes.size(), 7u);
-    analysis::SampledLoop loop;
-    loop.period = settings.period;
-    loop.friction = twin.friction();
-    loop.gravity_gradient = twin.gravity_gradient(q0);
-    loop.passive_stiffness = stiffness_of_load(robot.J, Load::kBaseWrench, world.wrench);
-    const auto spectrum = testing::spectrum_of(arm.system);
-    const analysis::SampledSpectrum sampled = sample_loop(arm.system, spectrum, loop);
-    for (const analysis::SampledMode& mode : sampled.modes) worst.add(fit, mode, 1e-5, 1e-5);
-
-    // What it would be with N and J# that stand still.
-    analysis::System<controller::kMaxJoints> still = arm.system;
-    settings.task_terms.load = Load::kIgnored;
-    controller::PostureLoop plain(twin.model, settings);
-    ASSERT_EQ(plain.closed_loop(q0, gains, Mode::kCartesian, still), controller::Status::kOk);
-    still.stiffness += stiffness_under_load(robot, controller::Impedance(settings.initial, n),
-                                            Load::kBaseWrench, {world.wrench, Vector6::Zero()});
-    still.stiffness_factor.resize(0, n);
-    const auto before = testing::spectrum_of(still);
-    for (int k = 0; k < 7; ++k) {
-      moved = std::max(
-          moved,
-          std::abs(before.modes[k].natural_frequency / spectrum.modes[k].natural_frequency - 1));
-    }
-  }
-  std::printf("%s, seeds 1 and 2: frequency within %.1e, ratio within %.1e; %.2g of it is N's\n",
-              GetParam().file, worst.frequency, worst.ratio, moved);
-  EXPECT_GT(moved, 1e-2);
 }
 
 }  // namespace

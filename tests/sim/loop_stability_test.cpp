@@ -4,7 +4,6 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/sim/linear_system.hpp>
-#include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
@@ -19,10 +18,32 @@ namespace {
 using controller::JointVector;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using testing::growth;
-using testing::plant_options;
 using testing::Random;
 using testing::spectrum_of;
+
+/// A simulated robot behind the drives that the analysis of a sampled loop supposes, with one step
+/// of the integrator in a period.
+sim::PlantOptions plant_options(const analysis::SampledLoop& loop) {
+  sim::PlantOptions options;
+  options.period = loop.period;
+  options.integrator.max_step = loop.period;
+  options.delay = loop.delay;
+  options.torque_cutoff = loop.torque_cutoff;
+  options.difference_velocity = loop.difference_velocity;
+  return options;
+}
+
+/// Growth of a size from the first to the last tenth of the ticks.
+template <class Step>
+double growth(int ticks, const Step& step) {
+  double first = 0, last = 0;
+  for (int k = 0; k < ticks; ++k) {
+    const double size = step();
+    if (k < ticks / 10) first = std::max(first, size);
+    if (k >= ticks - ticks / 10) last = std::max(last, size);
+  }
+  return last / first;
+}
 
 /// Ticks in which |z| or its inverse grows to e^9, and those before the largest |z| rules.
 int ticks_to_tell(double spectral_radius) {
@@ -41,7 +62,7 @@ TEST(LoopStability, TurnsWhereTheAnalysisSays) {
     nominal.damping = 20 * random.spd(n);
     analysis::SampledLoop loop;
     loop.period = random.log_uniform(5e-4, 4e-3);
-    loop.delay = static_cast<int>(seed % 4);
+    loop.delay = seed == 24 ? 60 : static_cast<int>(seed % 4);
     loop.torque_cutoff = random.integer(0, 1) * random.log_uniform(0.05, 0.3) / loop.period;
     loop.difference_velocity = random.integer(0, 1) == 1;
     loop.friction = 0.5 * random.spd(n);
@@ -134,65 +155,6 @@ TEST_P(ArmStability, TurnsWhereTheAnalysisSays) {
         EXPECT_GT(grown, 10) << "margin " << margin << ", |z| " << sampled.spectral_radius << ", "
                              << to_text(arm->worst);
       }
-    }
-  }
-}
-
-/// Soft joints of a Panda with its rotors. The torque against gravity comes late and feeds motion,
-/// so that the joints need more damping than in a loop with ideal gravity.
-TEST(LoopStability, LateGravityTakesDamping) {
-  DASHPOT_SKIP_IF_QUICK();
-  const testing::TwinModels twin(testing::arms()[0], false);
-  JointVector K(7), D(7), q0(7);
-  K << 60, 60, 60, 60, 10, 10, 10;
-  D << 0.3, 0.3, 0.3, 0.3, 0.1, 0.1, 0.1;
-  q0 << 0, 0.9, 0, -0.5, 0, 1.6, 0.8;
-  const auto settings_with = [&](double factor) {
-    controller::Settings settings =
-        release_settings(twin, controller::default_settings(twin.model).initial.gains, 2e-3);
-    settings.initial.mode = controller::Mode::kJoint;
-    settings.initial.gains.joint_stiffness = K.asDiagonal();
-    settings.initial.gains.joint_damping = (factor * D).asDiagonal();
-    settings.initial.gains.joint_damping_ratio = 0;
-    settings.analysis.sampled = {0, 4, 0, false};
-    return settings;
-  };
-  const auto radius = [&](double factor, bool late) {
-    controller::Settings settings = settings_with(factor);
-    settings.feed_forward.gravity = late;  // else the robot compensates it, without delay
-    const auto [system, loop] = controller::PostureLoop(twin.model, settings)
-                                    .at(q0, settings.initial.gains, controller::Mode::kJoint);
-    return sample_loop(system, analyze(system), loop).spectral_radius;
-  };
-  const auto least_factor = [&](bool late) {
-    double low = 0.5, high = 5;
-    while (high > 1.0001 * low) {
-      const double middle = std::sqrt(low * high);
-      (radius(middle, late) < 1 ? high : low) = middle;
-    }
-    return high;
-  };
-  const double least = least_factor(true), ideal = least_factor(false);
-  std::printf("dampers have to be %.4f times these, %.4f with ideal gravity\n", least, ideal);
-  EXPECT_GT(least, 1.2 * ideal);
-  for (const double share : {0.85, 1.15}) {
-    const double factor = share * least, late = radius(factor, true);
-    const bool stable = late < 1;
-    EXPECT_EQ(stable, share > 1);
-    EXPECT_LT(radius(factor, false), 1);
-    testing::ReleasedArm arm(twin, settings_with(factor), q0, 1e-6 * VectorXd::Ones(7),
-                             plant_options({.period = 2e-3, .delay = 4}));
-    const auto step = [&] {
-      EXPECT_EQ(arm.step(), sim::Status::kOk);
-      return arm.plant().velocity().norm();
-    };
-    const double ticks = 1 / std::abs(std::log(late));  // in which the slowest motion grows by e
-    growth(static_cast<int>(2 * ticks), step);          // the other motions decay
-    const double grown = growth(static_cast<int>(3 * ticks), step);
-    if (stable) {
-      EXPECT_LT(grown, 0.3) << "|z| " << late;
-    } else {
-      EXPECT_GT(grown, 3) << "|z| " << late;
     }
   }
 }
