@@ -157,22 +157,6 @@ TEST_F(Safety, ABlowIsNoBrokenSensor) {
   }
 }
 
-TEST_F(Safety, AShortGapChangesNothingAndALongOneLatches) {
-  run(1.0);
-  arm->state.time += 9'000'000;  // 10 ms after the last tick, the longest that is none
-  arm->setpoint.time = arm->state.time;
-  EXPECT_EQ(tick(), Status::kOk);
-  EXPECT_EQ(snapshot().restarts, 1u);
-  arm->state.time += 10'000'001;
-  arm->setpoint.time = arm->state.time;
-  EXPECT_EQ(tick(), Status::kTimeGap);
-  EXPECT_EQ(snapshot().joint_weight, 0);
-  EXPECT_TRUE(near(arm->torque, gravity(), 1e-6));
-  for (int k = 0; k < 3000; ++k) EXPECT_EQ(next(), Status::kFaultLatched);
-  EXPECT_EQ(snapshot().fault, Status::kTimeGap);
-  EXPECT_EQ(snapshot().restarts, 1u);
-}
-
 /// After a pause in which somebody moved the arm it stays where it was put, released or not.
 TEST_F(Safety, DoesNotDriveBackUnasked) {
   run(1.0);
@@ -186,20 +170,6 @@ TEST_F(Safety, DoesNotDriveBackUnasked) {
     arm->step();
   }
   EXPECT_TRUE(near(arm->state.position, put, 3e-3));
-}
-
-TEST_F(Safety, AReleasedFaultStartsWhereTheRobotIs) {
-  run(1.0);
-  arm->state.time += 50'000'000;
-  arm->setpoint.time = arm->state.time;
-  tick();
-  arm->controller.release();
-  EXPECT_LT(next(), Status::kSetpointRejected);
-  EXPECT_EQ(snapshot().restarts, 2u);
-  EXPECT_EQ(snapshot().fault, Status::kOk);
-  arm->controller.release();  // nothing to release
-  EXPECT_EQ(next(), Status::kOk);
-  EXPECT_EQ(snapshot().restarts, 2u);
 }
 
 TEST_F(Safety, AReleaseForgetsTheCommandedWrench) {

@@ -108,6 +108,8 @@ TEST_F(Check, NoticesALoopAtAnotherRate) {
       EXPECT_EQ(next(milliseconds), wrong && k >= 50 ? Status::kWrongRate : Status::kOk) << k;
     }
   }
+  make();
+  for (int k = 0; k < 500; ++k) EXPECT_EQ(next(k % 2 == 0 ? 0.3 : 1.7), Status::kOk) << "jitter";
   make();  // later on, with the mean of about 50 intervals: 1 - (49/50)^k of 1 ms is half of it
   for (int k = 0; k < 1000; ++k) EXPECT_EQ(next(), Status::kOk);
   for (int k = 1; k <= 40; ++k) {

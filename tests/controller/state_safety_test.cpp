@@ -15,43 +15,27 @@ namespace {
 using testing::kInfinity;
 using testing::near;
 using testing::Safety;
+
+/// What spoils a state, and what it is called; a jump is believed after a while, see below.
+struct Spoiler {
+  Status status;
+  void (*spoil)(RobotState& state);
+};
+const Spoiler kSpoilers[] = {
+    {Status::kStateNotFinite, [](RobotState& state) { state.position[1] = std::nan(""); }},
+    {Status::kStateNotFinite, [](RobotState& state) { state.velocity[6] = kInfinity; }},
+    {Status::kStateWrongSize, [](RobotState& state) { state.position.conservativeResize(6); }},
+    {Status::kStateWrongSize, [](RobotState& state) { state.velocity.resize(0); }},
+    {Status::kStateJump, [](RobotState& state) { state.position[5] += 0.2; }},
+    {Status::kStateJump, [](RobotState& state) { state.velocity[5] += 2.0; }},
+    {Status::kTimeBackward, [](RobotState& state) { state.time -= 5'000'000; }},
+};
+
 /// A fault for some ticks: the torque ramps to zero, and a good state brings the controller back.
 class Ramp : public Safety, public ::testing::WithParamInterface<int> {
  protected:
-  void spoil(RobotState& state) const {
-    switch (GetParam()) {
-      case 0:
-        state.position[1] = std::nan("");
-        break;
-      case 1:
-        state.velocity[6] = kInfinity;
-        break;
-      case 2:
-        state.position.conservativeResize(6);
-        break;
-      case 3:
-        state.velocity.resize(0);
-        break;
-      case 4:
-        state.position[5] += 0.2;
-        break;
-      case 5:
-        state.velocity[5] += 2.0;
-        break;
-      case 6:
-        state.time -= 5'000'000;
-        break;
-      default:
-        break;
-    }
-  }
-  Status expected() const {
-    constexpr Status kExpected[] = {Status::kStateNotFinite, Status::kStateNotFinite,
-                                    Status::kStateWrongSize, Status::kStateWrongSize,
-                                    Status::kStateJump,      Status::kStateJump,
-                                    Status::kTimeBackward};
-    return kExpected[GetParam()];
-  }
+  void spoil(RobotState& state) const { kSpoilers[GetParam()].spoil(state); }
+  Status expected() const { return kSpoilers[GetParam()].status; }
 };
 INSTANTIATE_TEST_SUITE_P(Faults, Ramp, ::testing::Range(0, 7));
 
@@ -70,7 +54,6 @@ TEST_P(Ramp, OneBadTickCostsLittleAndNothingStartsAfresh) {
 }
 
 class LongRamp : public Ramp {};
-// A jump is believed after a while, see below.
 INSTANTIATE_TEST_SUITE_P(Faults, LongRamp, ::testing::Range(0, 4));
 
 TEST_P(LongRamp, HoldsTheWeightForTwoSecondsAndStartsAfresh) {
@@ -209,21 +192,6 @@ TEST_F(Safety, VelocitiesThatContradictThePositionsLatch) {
   }
 }
 
-TEST_F(Safety, VelocitiesThatAgreeRoughlyAreBelieved) {
-  settings.watchdog.feedback = 0.5;
-  for (const double scale : {0.85, 1.2}) {
-    make();
-    run(1.0);
-    for (int k = 0; k < 1500; ++k) {
-      const double v = 0.5 * std::sin(0.01 * k);
-      arm->state.position[4] += 1e-3 * v;
-      arm->state.velocity[4] = scale * v;
-      next();
-      ASSERT_EQ(snapshot().fault, Status::kOk);
-    }
-  }
-}
-
 TEST_F(Safety, AStateThatNeverChangesWhileTheTorqueDoesLatches) {
   settings.watchdog.feedback = 0.5;
   make();
@@ -269,56 +237,9 @@ TEST_F(Safety, AStateThatFreezesInACreepingMotionLatches) {
   }
 }
 
-TEST_F(Safety, ALoopAtAnotherRateLatches) {
-  for (const int times : {2, 5}) {
-    make();
-    run(1.0);
-    int ticks = 0;
-    for (; ticks < 500 && snapshot().fault == Status::kOk; ++ticks) {
-      arm->state.time += 1'000'000 * times;
-      arm->setpoint.time = arm->state.time;
-      tick();
-    }
-    EXPECT_EQ(snapshot().fault, Status::kWrongRate);
-    EXPECT_LT(ticks, 60);
-  }
-  make();
-  run(1.0);
-  for (int k = 0; k < 500; ++k) {  // jitter is none
-    arm->state.time += k % 2 == 0 ? 300'000 : 1'700'000;
-    arm->setpoint.time = arm->state.time;
-    tick();
-  }
-  EXPECT_EQ(snapshot().fault, Status::kOk);
-}
-
-class Swings : public Safety {
- protected:
-  /// The fault after swings of joint 5 that grow (growth 1) or decay (-1).
-  Status swing(double growth) {
-    const double center = arm->state.position[4], start = growth > 0 ? 0.02 : 1.0;
-    for (int k = 0; k < 1500 && snapshot().fault == Status::kOk; ++k) {
-      const double t = 1e-3 * k, w = 40;
-      const double speed = start * std::exp(growth * 3 * t);
-      arm->state.position[4] = center + speed / w * std::sin(w * t);
-      arm->state.velocity[4] = speed * std::cos(w * t);
-      next();
-    }
-    return snapshot().fault;
-  }
-};
-
-TEST_F(Swings, LatchIfTheyGrowAsLongAsNothingIsAskedFor) {
-  for (const double growth : {1.0, -1.0}) {
-    make();
-    run(1.0);
-    EXPECT_EQ(swing(growth), growth > 0 ? Status::kInstability : Status::kOk);
-    EXPECT_LT(std::abs(arm->state.velocity[4]), 1.5);
-  }
-}
-
-/// A reference that lost its springs while it moved does not count as moving.
-TEST_F(Swings, LatchIfTheyGrowAfterAChangeOfMode) {
+/// Swings that grow are an instability, also where a reference lost its springs while it moved: it
+/// does not count as moving.
+TEST_F(Safety, SwingsThatGrowAfterAChangeOfModeLatch) {
   settings.motion.gain_time = 0.002;
   make();
   run(1.0);
@@ -328,7 +249,14 @@ TEST_F(Swings, LatchIfTheyGrowAfterAChangeOfMode) {
   arm->setpoint.mode = Mode::kCartesian;
   arm->setpoint.tip_pose = arm->tip();
   for (int k = 0; k < 3000; ++k) arm->step();
-  EXPECT_EQ(swing(1), Status::kInstability);
+  const double center = arm->state.position[4];
+  for (int k = 0; k < 1500 && snapshot().fault == Status::kOk; ++k) {
+    const double t = 1e-3 * k, w = 40, speed = 0.02 * std::exp(3 * t);
+    arm->state.position[4] = center + speed / w * std::sin(w * t);
+    arm->state.velocity[4] = speed * std::cos(w * t);
+    next();
+  }
+  EXPECT_EQ(snapshot().fault, Status::kInstability);
 }
 
 TEST_F(Safety, AWallIsNotCrossed) {
@@ -360,21 +288,6 @@ TEST_F(Safety, ACollisionLatches) {
   }
   EXPECT_EQ(snapshot().fault, Status::kCollision);
   EXPECT_LT(ticks, 40);
-  settings.limits.external_torque.setConstant(testing::kInfinity);
-  settings.limits.external_force = 20;
-  make();
-  run(1.0);
-  arm->state.external_wrench[0] = 19;
-  EXPECT_NE(arm->step(), Status::kCollision);
-  arm->state.external_wrench[0] = 21;
-  EXPECT_EQ(arm->step(), Status::kCollision);
-}
-TEST_F(Safety, AFlickeringSensorIsNeverBelieved) {
-  run(1.0);
-  for (int k = 0; k < 50; ++k) {  // 0.5 rad to and fro, at rest: before the bound has grown to it
-    arm->state.position[5] += k % 2 == 0 ? 0.5 : -0.5;
-    EXPECT_EQ(next(), k % 2 == 0 ? Status::kStateJump : Status::kOk);
-  }
 }
 
 TEST_F(Safety, ShowsWhatIsMeasuredWhileTheTorqueIsRampedDown) {
