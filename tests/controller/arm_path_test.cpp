@@ -28,7 +28,7 @@ void lead(const Arm& arm, const GainScales& scales) {
   const ModeWatch& watch = watched->watch();
   EXPECT_GT(watch.separated, 150);
   EXPECT_EQ(watch.lost, 0);
-  EXPECT_EQ(watch.unexplained, 0);
+  EXPECT_LT(watch.largest_change, 0.02);
   EXPECT_EQ(watch.not_numbers, 0);
   EXPECT_EQ(watch.bounds_missing, 0);
   EXPECT_GE(watched->counters().tracked, 295);

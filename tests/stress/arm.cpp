@@ -14,13 +14,10 @@ using dashpot::analysis::TrackerCounters;
 
 void print(const char* arm, const GainScales& scales, const TrackerCounters& c, const ModeWatch& w,
            const Verdict& all) {
-  std::printf(
-      "%-12s %4g %4g | %6ld %6ld %5ld | %4.2f | %4.2f %7.1e | %7ld %4ld | %7ld %5ld %4ld %4ld "
-      "%4ld | %7.1e\n",
-      arm, scales.damping, scales.null_space, c.updates(), c.tracked, c.direct,
-      static_cast<double>(c.iterations) / static_cast<double>(c.updates()), all.tightest,
-      all.widest, w.separated, w.lost, w.foreseen, w.finer, w.paired_anew, w.veered, w.unexplained,
-      w.largest_change);
+  std::printf("%-12s %4g %4g | %6ld %6ld %5ld | %4.2f | %4.2f %7.1e | %7ld %4ld | %7.1e\n", arm,
+              scales.damping, scales.null_space, c.updates(), c.tracked, c.direct,
+              static_cast<double>(c.iterations) / static_cast<double>(c.updates()), all.tightest,
+              all.widest, w.separated, w.lost, w.largest_change);
 }
 
 bool lead(const Arm& arm, const GainScales& scales, long ticks) {
@@ -36,8 +33,8 @@ bool lead(const Arm& arm, const GainScales& scales, long ticks) {
   }
   const ModeWatch& w = watched->watch();
   print(arm.file, scales, watched->counters(), w, all);
-  const bool good = all.enclosed && w.lost == 0 && w.unexplained == 0 && w.not_numbers == 0 &&
-                    w.bounds_missing == 0 && watched->counters().failed == 0;
+  const bool good = all.enclosed && w.lost == 0 && w.not_numbers == 0 && w.bounds_missing == 0 &&
+                    watched->counters().failed == 0;
   if (!good) {
     std::printf("  NOT GOOD: enclosed %d, not a number %ld, without bound %ld\n", all.enclosed,
                 w.not_numbers, w.bounds_missing);
@@ -48,13 +45,10 @@ bool lead(const Arm& arm, const GainScales& scales, long ticks) {
 bool lead_arms(const Request& request) {
   std::printf(
       "Damping and null space: multiples of the default gains. Modes: identity decided by the "
-      "eigenvalues,\nlost; damping ratio from tick to tick within bounds and derivative, or so "
-      "with "
-      "finer steps,\nreal eigenvalues paired again, veered within a tick, unexplained, largest "
-      "change.\n"
+      "eigenvalues,\nlost; largest change of such a mode's damping ratio from tick to tick.\n"
       "arm          damp null |  ticks track. dir.  | pass | err/ "
       "widest  |"
-      "  apart  lost |  deriv. finer pair veer unex | change\n");
+      "  apart  lost | change\n");
   bool good = true;
   for (const Arm& arm : arms()) {
     for (const GainScales& scales : {GainScales{1, 1}, GainScales{0.1, 0}, GainScales{3, 1}}) {

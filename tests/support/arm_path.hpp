@@ -85,16 +85,11 @@ class ArmLoop {
 
 /// What is wrong with the modes of a tick, or odd.
 struct ModeWatch {
-  long modes = 0;        ///< compared with those of the tick before; soft ones are not
-  long separated = 0;    ///< whose identity the eigenvalues alone decide
-  long lost = 0;         ///< of these, those that were given another place
-  long foreseen = 0;     ///< damping ratio within bounds and derivative
-  long finer = 0;        ///< within them on a way of finer steps
-  long paired_anew = 0;  ///< of real eigenvalues that go together in another way
-  long veered = 0;       ///< exchanged with another mode within the tick
-  long unexplained = 0;
+  long modes = 0;      ///< compared with those of the tick before; soft ones are not
+  long separated = 0;  ///< whose identity the eigenvalues alone decide
+  long lost = 0;       ///< of these, those that were given another place
   long not_numbers = 0, bounds_missing = 0;
-  double largest_change = 0;  ///< of a damping ratio from tick to tick
+  double largest_change = 0;  ///< of a separated one's damping ratio from tick to tick
 };
 
 /// Follows the modes of one arm and compares each tick with the one before.
@@ -108,12 +103,9 @@ class WatchedArm {
   /// Up to the share t of the way.
   void step(double t) {
     before_ = now_;
-    before_system_ = system_;
-    const ArmLoop loop_before = loop_;
-    *tracker_before_ = tracker_;
-    advance(t);
-    if (ticks_++ > 0) compare(loop_before, t);
-    t_ = t;
+    system_ = loop_.at(arm_way(name_, t));
+    tracker_.update(system_, now_);
+    if (ticks_++ > 0) compare();
   }
 
   const System& system() const { return system_; }
@@ -129,32 +121,20 @@ class WatchedArm {
   }
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-  void advance(double t) {
-    system_ = loop_.at(arm_way(name_, t));
-    tracker_.update(system_, now_);
-  }
-
-  void compare(const ArmLoop& loop_before, double t);
+  void compare();
   /// Another place that holds what this mode was, as far as its eigenvalues tell.
   bool given_away(int i, bool& separated) const;
-  /// Damping ratio within the bounds of both spectra and the change that their derivative foresees.
-  bool foreseen(int i, const analysis::TrackedSpectrum& from, const System& from_system,
-                const analysis::TrackedSpectrum& to, const System& to_system) const;
-  bool explained_by_finer_steps(int i, const ArmLoop& loop_before, double t);
 
   std::string name_;
   ArmLoop loop_;
   analysis::ModeTracker tracker_;
-  std::unique_ptr<analysis::ModeTracker> tracker_before_ =
-      std::make_unique<analysis::ModeTracker>(options());
-  System system_, before_system_;
+  System system_;
   analysis::TrackedSpectrum now_, before_;
   ModeWatch watch_;
-  double t_ = 0;
   long ticks_ = 0;
 };
 
-inline void WatchedArm::compare(const ArmLoop& loop_before, double t) {
+inline void WatchedArm::compare() {
   using analysis::ModeKind;
   if (now_.mode_count != before_.mode_count || now_.epoch != before_.epoch) return;
   for (int i = 0; i < now_.mode_count; ++i) {
@@ -170,19 +150,9 @@ inline void WatchedArm::compare(const ArmLoop& loop_before, double t) {
     const bool lost = given_away(i, separated);
     watch_.separated += separated ? 1 : 0;
     watch_.lost += lost ? 1 : 0;
+    if (!separated) continue;
     const double change = std::abs(is.damping_ratio - was.damping_ratio);
     watch_.largest_change = std::max(watch_.largest_change, change);
-    if (foreseen(i, before_, before_system_, now_, system_)) {
-      ++watch_.foreseen;
-    } else if (explained_by_finer_steps(i, loop_before, t)) {
-      ++watch_.finer;
-    } else if (was.eigenvalues[0].imag() == 0 || is.eigenvalues[0].imag() == 0) {
-      ++watch_.paired_anew;
-    } else if (!separated) {
-      ++watch_.veered;
-    } else {
-      ++watch_.unexplained;
-    }
   }
 }
 
@@ -203,53 +173,6 @@ inline bool WatchedArm::given_away(int i, bool& separated) const {
   const bool real = was.imag() == 0 || now_.modes[at(place)].eigenvalues[0].imag() == 0;
   separated = !real && second > 4 * nearest;
   return separated && place != i;
-}
-
-inline bool WatchedArm::foreseen(int i, const analysis::TrackedSpectrum& from,
-                                 const System& from_system, const analysis::TrackedSpectrum& to,
-                                 const System& to_system) const {
-  using Matrix = Eigen::MatrixXd;
-  const Matrix M = to_system.mass - from_system.mass, C = to_system.damping - from_system.damping;
-  const Matrix W = to_system.stiffness_factor, V = from_system.stiffness_factor;
-  const Matrix K = W.transpose() * (W - V) + (W - V).transpose() * V;
-  const analysis::ModeNumbers &was = from.modes[at(i)], &is = to.modes[at(i)];
-  analysis::Complex sum = 0, product = 1;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const auto& u = from.shapes[at(i)].u[k];
-    const analysis::Complex z = was.eigenvalues[k];
-    const Eigen::VectorXcd change = z * z * (M * u) + z * (C * u) + K * u;
-    const analysis::Complex moved = (u.transpose() * change).value();
-    const analysis::Complex there = z - moved / from.shapes[at(i)].slope[k];
-    sum += there;
-    product *= there;
-  }
-  const double predicted = -0.5 * sum.real() / std::sqrt(product.real());
-  const double bounds = was.damping_ratio_bound + is.damping_ratio_bound;
-  const double rate = std::abs(predicted - was.damping_ratio);
-  return std::abs(is.damping_ratio - predicted) <= bounds + 0.2 * rate + 1e-6;
-}
-
-inline bool WatchedArm::explained_by_finer_steps(int i, const ArmLoop& loop_before, double t) {
-  for (const int parts : {16, 256, 4096}) {
-    ArmLoop loop = loop_before;
-    const auto tracker = std::make_unique<analysis::ModeTracker>(*tracker_before_);
-    const auto from = std::make_unique<analysis::TrackedSpectrum>(before_);
-    const auto to = std::make_unique<analysis::TrackedSpectrum>(before_);
-    System from_system = before_system_;
-    bool smooth = true;
-    for (int part = 1; part <= parts && smooth; ++part) {
-      const double share = static_cast<double>(part) / parts;
-      const System system = loop.at(arm_way(name_, part == parts ? t : t_ + share * (t - t_)));
-      tracker->update(system, *to);
-      smooth = foreseen(i, *from, from_system, *to, system);
-      *from = *to;
-      from_system = system;
-    }
-    const analysis::ModeNumbers &fine = to->modes[at(i)], &is = now_.modes[at(i)];
-    const double apart = std::abs(fine.damping_ratio - is.damping_ratio);
-    if (smooth && apart <= fine.damping_ratio_bound + is.damping_ratio_bound + 1e-9) return true;
-  }
-  return false;
 }
 
 }  // namespace dashpot::testing
