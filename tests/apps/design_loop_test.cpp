@@ -2,9 +2,7 @@
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
-#include <algorithm>
 #include <cmath>
-#include <complex>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -68,37 +66,17 @@ TEST(DesignForALoop, TakesTheDampingThatIsThereForTheJointsOwn) {
   EXPECT_GT(result["modes"][0]["damping_ratio"], without + 0.3);
 }
 
-using Complex = std::complex<double>;
-
-/// Returns what is zero at the eigenvalues z of the mass with its springs of 800 N/m and their
-/// integral, and with the damper c, all times s: of a torque held for T = 20 ms, one tick late.
-Complex characteristic(Complex z, double c, double integral_time, double s) {
-  const double T = 0.02, m = 2, k = 800;
-  const Complex force = T * T * (z + 1.0) / 2.0 * (k * (z - 1.0) + k * T / integral_time) +
-                        T * c * (z - 1.0) * (z - 1.0);
-  return z * m * std::pow(z - 1.0, 3) + s * force;
-}
-
+/// What it makes of eigenvalues and margin is in controller_memory_test.cpp.
 TEST(DesignForALoop, CountsTheIntegralOfTheSprings) {
   const std::vector<std::string> options = {"--damping-ratio", "0.4", "--period", "0.02",
                                             "--delay",         "1",   "--margin", "1.1"};
   const double without = design_json(kMass, options)["loop"]["gain_margin"];
   Words with = joined(options, {"--integral-time", "500 ms"});
   const Json result = design_json(kMass, with);
-  const double c = result["damping"][0][0], margin = result["loop"]["gain_margin"];
   EXPECT_EQ(result["loop"]["level"], 1);
-  EXPECT_LT(margin, 0.98 * without);
+  EXPECT_LT(result["loop"]["gain_margin"].get<double>(), 0.98 * without);
   ASSERT_EQ(result["loop"]["integral_decays"].size(), 1U);
-  const double decay = result["loop"]["integral_decays"][0];
-  EXPECT_NEAR(decay, 2, 0.3);
-  EXPECT_LT(std::abs(characteristic(std::exp(-0.02 * decay), c, 0.5, 1)), 1e-12);
-  // At the margin an eigenvalue lies on the unit circle.
-  double least = 1;
-  for (int i = 1; i <= 100'000; ++i) {
-    const Complex z = std::polar(1.0, 3.14159265358979 * i / 100'000);
-    least = std::min(least, std::abs(characteristic(z, c, 0.5, margin) / std::pow(z - 1.0, 3)));
-  }
-  EXPECT_LT(least, 1e-3);
+  EXPECT_NEAR(result["loop"]["integral_decays"][0].get<double>(), 2, 0.3);
   EXPECT_THAT(design(kMass, with).out, HasSubstr("The integral of the springs makes 1 slow mode, "
                                                  "which decays at "));
   // Quicker than the mass follows: nothing is proposed.

@@ -1,18 +1,14 @@
 // `dashpot run` in fast motion: a whole robot, its controller as a plugin, and what is written.
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/arms.hpp>
-#include <dashpot/tests/support/kdl_dynamics.hpp>
 #include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
-#include <complex>
 #include <filesystem>
 #include <numbers>
 #include <sstream>
@@ -203,16 +199,6 @@ TEST(Run, LeavesAStruckArmWhereItsZeroModePredicts) {
   EXPECT_LT((rest_of("panda_push_held") - start).norm(), 1e-6);
 }
 
-TEST(Run, HoldsADampingRatioWhereverTheArmIs) {
-  const Json result = run_json(scene("panda_release_ratio_damping"), {"--duration", "2"});
-  for (const char* when : {"start", "end"}) {
-    ASSERT_EQ(result["modes"][when].size(), 6U);
-    for (const Json& mode : result["modes"][when]) {
-      EXPECT_NEAR(mode["damping_ratio"].get<double>(), 0.7, 1e-6);
-    }
-  }
-}
-
 // The arm stays where it is if the controller carries just the weight that is simulated.
 TEST(Run, SimulatesTheRobotThatTheControllerIsTold) {
   const Scratch scratch;
@@ -300,44 +286,6 @@ TEST(Run, WritesALogThatTheMonitorReads) {
   EXPECT_THAT(outcome.out, HasSubstr("0 modes messages lost, 0 messages malformed\n"));
 }
 
-/// By KDL: (l^2 M + l C + K) u = 0 for each mode with K = J' K_C J, C = J' C_C J,
-/// as many modes as J has rows, and the sum of all eigenvalues is -trace(M^-1 C).
-TEST(Run, PublishesTheModesThatAStrangerComputes) {
-  const Scratch scratch;
-  const std::string log = scratch.path("a.lcm");
-  EXPECT_EQ(run_scene(scene("panda_release_c2"), {"--duration", "0.5", "--log", log}).status, 0);
-  const controller::RobotModel arm = testing::panda_model();
-  const Eigen::VectorXd K_C{{2000, 600, 2000, 100, 100, 100}}, C_C{{22.5, 23.5, 45, 2, 12, 1}};
-  int messages = 0;
-  lcmtypes::MessageHandlers handlers;
-  handlers.on_modes = [&](const modes_t& modes) {
-    ++messages;
-    const Eigen::VectorXd q = Eigen::Map<const Eigen::VectorXd>(modes.joint_position.data(), 7);
-    const auto terms = testing::by_kdl(arm, q, Eigen::VectorXd::Zero(7));
-    const Eigen::MatrixXd M = terms.M, J = terms.J;
-    const Eigen::MatrixXd K = J.transpose() * K_C.asDiagonal() * J,
-                          C = J.transpose() * C_C.asDiagonal() * J;
-    ASSERT_EQ(modes.num_modes, 6);
-    double sum = 0;
-    for (std::size_t i = 0; i < 6; ++i) {
-      const std::complex<double> l(modes.eigenvalue_real[i][0], modes.eigenvalue_imag[i][0]);
-      Eigen::VectorXcd u(7);
-      for (Eigen::Index k = 0; k < 7; ++k) {
-        const auto at = static_cast<std::size_t>(k);
-        u[k] = {modes.shape_real[i][at], modes.shape_imag[i][at]};
-      }
-      const double size = std::norm(l) * M.norm() + std::abs(l) * C.norm() + K.norm();
-      EXPECT_LT((l * l * (M * u) + l * (C * u) + K * u).norm(), 1e-13 * size * u.norm());
-      sum += modes.eigenvalue_real[i][0] + modes.eigenvalue_real[i][1];
-    }
-    const double trace = -M.llt().solve(C).trace();
-    EXPECT_NEAR(sum, trace, 1e-12 * std::abs(trace));
-  };
-  lcmtypes::LogReader reader(log, handlers);
-  while (reader.read()) reader.handle();
-  EXPECT_GE(messages, 40);
-}
-
 TEST(Run, PrintsTablesForPeople) {
   const Outcome outcome = run_scene(scene("baxter_left"), {"--duration", "0.5"});
   EXPECT_EQ(outcome.status, 0);
@@ -357,16 +305,6 @@ TEST(Run, SaysThatItCouldNotWrite) {
     EXPECT_THAT(outcome.err, HasSubstr(" messages could not be written"));
   }
   EXPECT_EQ(run_scene(scene("ur5"), {"--csv", "/dev/null", "--log", "/dev/null"}).status, 2);
-}
-
-TEST(Run, DampsAnArmThatIsPushedHard) {
-  const Scratch scratch;
-  const std::string file =
-      changed(scratch, "panda", "{begin: 1 s, end: 1.1 s, wrench: [0, 20 N, 0, 0, 0, 0]}",
-              "{begin: 1 s, end: 1.1 s, wrench: [100 N, 100 N, 0, 0, 0, 0]}");
-  const Json result = run_json(file, {"--duration", "2"});
-  EXPECT_GT(result["status"]["velocity limit exceeded, damping"].get<int>(), 10);
-  EXPECT_LT(result["status"].value("state jumped, torque ramped down", 0), 30);
 }
 
 TEST(Run, SaysWhenTheSimulationFails) {

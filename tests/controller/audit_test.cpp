@@ -1,5 +1,6 @@
-// What gains do on an arm: against eigenvalues in long double, a sampled loop that is stepped tick
-// by tick, and closed forms.
+// What gains do on an arm: against eigenvalues in long double, and closed forms. Margins are those
+// of the loop at a posture (tests/threads/one_loop_test.cpp), which
+// tests/sim/loop_stability_test.cpp steps tick by tick.
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/posture_loop.hpp>
@@ -10,11 +11,9 @@
 
 #include <gmock/gmock.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <functional>
 #include <limits>
 #include <stdexcept>
@@ -279,84 +278,6 @@ TEST_F(AuditOfPanda, RefusesGainsThatCannotBe) {
   }
   const Audit good(model, stated(kTranslationFirst, 2));
   EXPECT_THROW(good.numbers(JointVector::Zero(6)), std::invalid_argument);
-}
-
-/// Runs the sampled loop with `factor` times the gains, and returns the largest deflection of the
-/// last ticks over that of those before.
-double growth(const TaskLoop& loop, const AuditOptions& options, double factor) {
-  const Eigen::Index n = loop.dof();
-  const MatrixXd K = factor * loop.stiffness, C = factor * loop.damping;
-  const Eigen::LLT<MatrixXd> mass(loop.mass);
-  const double T = options.period;
-  const double gain = options.cutoff > 0 ? -std::expm1(-2 * M_PI * options.cutoff * T) : 1;
-  const Eigen::VectorXd start = Eigen::VectorXd::LinSpaced(n, 1, 2);
-  Eigen::VectorXd q = start, velocity = Eigen::VectorXd::Zero(n), before = q;
-  Eigen::VectorXd filtered = Eigen::VectorXd::Zero(n), stored = filtered;
-  std::deque<Eigen::VectorXd> queue(static_cast<std::size_t>(options.delay), filtered);
-  double early = 0, late = 0;
-  constexpr int kTicks = 16000;
-  for (int tick = 0; tick < kTicks; ++tick) {
-    const Eigen::VectorXd used =
-        options.difference_velocity ? Eigen::VectorXd((q - before) / T) : velocity;
-    queue.push_back(-K * q - C * used - stored);
-    if (options.integral_time > 0) stored += T / options.integral_time * K * q;
-    filtered += gain * (queue.front() - filtered);
-    queue.pop_front();
-    const Eigen::VectorXd acceleration = mass.solve(filtered);
-    before = q;
-    q += T * velocity + 0.5 * T * T * acceleration;
-    velocity += T * acceleration;
-    const double size = (K * q).norm() + T * (K * velocity).norm();
-    if (tick >= kTicks / 2 && tick < 3 * kTicks / 4) early = std::max(early, size);
-    if (tick >= 3 * kTicks / 4) late = std::max(late, size);
-    if (!(size < 1e200)) return kInfinity;
-  }
-  return late / early;
-}
-
-TEST_F(AuditOfPanda, FindsTheMarginAtWhichASampledLoopStartsToGrow) {
-  options.period = 0.0005;
-  for (const bool slow : {false, true}) {
-    options.delay = slow ? 1 : 0;
-    options.cutoff = slow ? 300 : 0;
-    options.difference_velocity = slow;
-    const Audit audit(model, options);
-    const double margin = audit.numbers(home).gain_margin;
-    const TaskLoop loop = loop_at(model, home, options);
-    EXPECT_LT(growth(loop, options, 0.995 * margin), 1) << margin;
-    EXPECT_GT(growth(loop, options, 1.005 * margin), 1) << margin;
-    EXPECT_NEAR(audit.audit(home).numbers.gain_margin, margin, 1e-6 * margin);
-    EXPECT_TRUE(audit.audit(home).integral_decays.empty());
-  }
-}
-
-TEST_F(AuditOfPanda, CountsTheIntegralOfTheSprings) {
-  options.period = 0.0005;
-  options.delay = 1;
-  options.half_quaternion = true;
-  const double without = numbers().gain_margin;
-  Matrix6 K = options.gains.task_stiffness;  // with which the springs act
-  K.bottomRightCorner<3, 3>() *= 0.5;
-  const TaskLoop loop = loop_at(model, home, K, options.gains.task_damping);
-  for (const double time : {0.02, 1.0}) {
-    SCOPED_TRACE(time);
-    options.integral_time = time;
-    const Audit audit(model, options);
-    const PostureAudit found = audit.audit(home);
-    const double margin = found.numbers.gain_margin;
-    EXPECT_NEAR(audit.numbers(home).gain_margin, margin, 1e-5 * margin);
-    ASSERT_GE(found.integral_decays.size(), 6U);
-    if (time < 0.1) {  // slow modes follow it, and it is unstable
-      EXPECT_GT(growth(loop, options, 1), 1);
-      EXPECT_LT(margin, 1);
-      continue;
-    }
-    EXPECT_LT(growth(loop, options, 0.995 * margin), 1) << margin;
-    EXPECT_GT(growth(loop, options, 1.005 * margin), 1) << margin;
-    EXPECT_NEAR(margin, without, 1e-3 * without);  // at which a wrist vibrates, much faster
-    for (const double decay : found.integral_decays) EXPECT_NEAR(decay * time, 1, 0.6);
-    EXPECT_TRUE(std::is_sorted(found.integral_decays.begin(), found.integral_decays.end()));
-  }
 }
 
 /// A link on its own, and its gains.

@@ -2,7 +2,6 @@
 // torque, beside friction and in either mode, and nothing jumps.
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
-#include <dashpot/tests/support/count_allocations.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -337,30 +336,6 @@ TEST(DesignedDamping, IsSemidefiniteWhereFrictionIsTooMuch) {
     EXPECT_GT(least_eigenvalue_of(led.damping() - 30 * MatrixXd::Identity(7, 7)), -1e-9);
   }
   EXPECT_EQ(led.modes().counters.failed, 0u);
-}
-
-TEST(DesignedDamping, NeverAllocates) {
-  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
-  for (const double friction : {0.0, 0.5, 30.0}) {
-    const RobotModel model = rubbing(testing::arms()[0], friction);
-    LedArm led(model, rubbing_settings(model, Mode::kJoint));
-    led.settle();
-    Gains& gains = led.setpoint.gains;
-    const Matrix6 stiffness = gains.task_stiffness;
-    const auto run = [&] {
-      for (int k = 0; k < 2000; ++k) {
-        if (k % 700 == 200) led.setpoint.mode = Mode::kCartesian;
-        if (k % 700 == 0) led.setpoint.mode = Mode::kJoint;
-        if (k % 300 == 0) gains.joint_damping_ratio = k % 600 == 0 ? 0 : 1.2;
-        if (k % 300 == 0) gains.task_stiffness = (1 + 1e-3 * k) * stiffness;
-        if (k % 500 == 0) gains.task_damping_ratio = 0.7 - gains.task_damping_ratio;
-        if (k % 400 == 0) gains.frame = k % 800 == 0 ? Frame::kTool : Frame::kBase;
-        led.swing(1e-3 * k);
-        led.tick();
-      }
-    };
-    EXPECT_EQ(testing::allocations_of(run), 0);
-  }
 }
 
 TEST(DesignedDamping, RefusesWhatIsNoRatio) {

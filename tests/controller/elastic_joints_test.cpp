@@ -1,21 +1,19 @@
-// Gears that bend: in the modes of the tick, at a posture, and in the sampled loop.
+// Gears that bend: in the modes of the tick, and at a posture. The sampled loop with them is in
+// tests/sim/elastic_prediction_test.cpp.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/core/gears_stop.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/settings_check.hpp>
-#include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
-#include <dashpot/tests/support/random.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include <algorithm>
 #include <cmath>
@@ -276,44 +274,6 @@ TEST(ElasticJoints, AreStoppedByABrakeThatTheyBear) {
   EXPECT_EQ(gears_stopping_time(rigid, default_settings(rigid), 0.05), 0);
 }
 
-TEST(ElasticJoints, ComeNearRigidOnesAsTheirStiffnessGrows) {
-  const testing::Arm& arm = testing::arms()[0];
-  ModelOptions rigid = gears(7, 1e4, PositionSensor::kMotor);
-  rigid.gear_stiffness = JointVector::Constant(7, kInfinite);
-  const RobotModel plain = testing::arm_model(arm, rigid);
-  ASSERT_EQ(plain.elastic_joints(), 0);
-  const auto truth = frequencies_of(joint_loop(plain, 300, 20));
-  double last = 0;
-  for (const double stiffness : {1e5, 1e6, 1e7, 1e8}) {
-    ModelOptions options = gears(7, stiffness, PositionSensor::kMotor, 0);
-    const auto found = frequencies_of(joint_loop(testing::arm_model(arm, options), 300, 20));
-    ASSERT_EQ(found.size(), 14u);
-    double worst = 0;
-    for (std::size_t i = 0; i < 7; ++i) {
-      worst = std::max(worst, std::abs(found[i + 7] / truth[i] - 1));
-    }
-    EXPECT_GT(worst, 0);
-    if (last > 0) EXPECT_NEAR(last / worst, 10, 1.5) << stiffness;
-    last = worst;
-  }
-  EXPECT_LT(last, 1e-4);
-}
-
-// Pushed at its links, the arm gives way by springs and gears in series.
-TEST(ElasticJoints, SoftenTheArmByTheirCompliance) {
-  for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
-    const RobotModel model = testing::arm_model(testing::arms()[1], gears(7, 1e4, sensor));
-    const analysis::System<kMaxJoints> system = joint_loop(model, 800);
-    const MatrixXd compliance = MatrixXd(system.stiffness).inverse().topLeftCorner(7, 7);
-    const VectorXd gear = model.joint_values(&Joint::gear_stiffness);
-    const MatrixXd wanted =
-        sensor == PositionSensor::kMotor
-            ? MatrixXd((gear.cwiseInverse().array() + 1.0 / 800).matrix().asDiagonal())
-            : MatrixXd(MatrixXd::Identity(7, 7) / 800);  // what is measured is held
-    EXPECT_LE((compliance - wanted).norm(), 1e-12 * wanted.norm());
-  }
-}
-
 TEST(ElasticJoints, MayBeSomeOfTheJoints) {
   ModelOptions options = gears(7, 1e4, PositionSensor::kMotor, 0);
   for (const Index rigid : {1, 4, 5}) options.gear_stiffness[rigid] = kInfinite;
@@ -325,72 +285,6 @@ TEST(ElasticJoints, MayBeSomeOfTheJoints) {
   ASSERT_EQ(found.size(), 11u);
   ASSERT_EQ(nearly.size(), 14u);
   for (std::size_t i = 0; i < 11; ++i) EXPECT_NEAR(found[i], nearly[i + 3], 1e-4 * found[i]) << i;
-}
-
-/// One tick of the arm of the textbook with its controller, by the exponential of a matrix of
-/// Eigen's: gains times `factor`, gravity compensated where it is measured, torque late by a tick.
-double spectral_radius(const Matrices& loop, const Matrices& gears_alone, const MatrixXd& gravity,
-                       bool link, double factor, double period) {
-  const Index n = gravity.rows(), N = 2 * n;
-  MatrixXd robot = gears_alone.K;
-  robot.topLeftCorner(n, n) += gravity;
-  MatrixXd rate = MatrixXd::Zero(2 * N + n, 2 * N + n);
-  rate.block(0, N, N, N).setIdentity();
-  rate.block(N, 0, N, N) = -loop.M.inverse() * robot;
-  rate.block(N, N, N, N) = -loop.M.inverse() * gears_alone.C;
-  MatrixXd input = MatrixXd::Zero(N, n);
-  input.bottomRows(n).setIdentity();
-  rate.block(N, 2 * N, N, n) = loop.M.inverse() * input;
-  const MatrixXd step = (rate * period).exp();
-  MatrixXd A = MatrixXd::Zero(2 * N + n, 2 * N + n);  // state and the torque that is on its way
-  A.topRows(2 * N) = step.topRows(2 * N);
-  A.block(2 * N, 0, n, N) = -factor * (loop.K - gears_alone.K).bottomRows(n);
-  A.block(2 * N, N, n, N) = -factor * (loop.C - gears_alone.C).bottomRows(n);
-  A.block(2 * N, link ? 0 : n, n, n) += gravity;
-  double largest = 0;
-  const Eigen::VectorXcd eigenvalues = Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues();
-  for (const analysis::Complex z : eigenvalues) {
-    if (std::abs(std::log(z)) / period >= kSlowestVibration) {
-      largest = std::max(largest, std::abs(z));
-    }
-  }
-  return largest;
-}
-
-// Against another way to sample the loop, whose boundary is where its spectral radius is 1.
-TEST(ElasticJoints, HaveTheGainMarginOfALoopSampledAnotherWay) {
-  testing::Random random(4101);
-  for (int k = 0; k < 24; ++k) {
-    SCOPED_TRACE(k);
-    const testing::Arm& arm = testing::arms()[static_cast<std::size_t>(k % 3)];
-    const int n = testing::arm_model(arm).dof();
-    const auto sensor = k % 2 == 0 ? PositionSensor::kMotor : PositionSensor::kLink;
-    const double stiffness = std::pow(10.0, random.uniform(3.7, 5));
-    const RobotModel model = testing::arm_model(arm, gears(n, stiffness, sensor, 0.05));
-    Settings settings = default_settings(model);
-    settings.limits.gain_margin = 1;
-    settings.analysis.sampled.delay = 1;
-    Gains gains = settings.initial.gains;
-    JointVector q(n);
-    for (Index i = 0; i < n; ++i) q[i] = random.uniform(-1, 1);
-    analysis::System<kMaxJoints> system;
-    PostureLoop posture(model, settings);
-    ASSERT_EQ(posture.closed_loop(q, gains, Mode::kJoint, system), Status::kOk);
-    const analysis::SampledLoop loop = posture.sampled();
-    const MatrixXd gravity = gravity_gradient(DynamicsKernel(model), q);
-    analysis::SpectrumSolver<kMaxJoints> solver;
-    analysis::Spectrum<kMaxJoints> spectrum;
-    ASSERT_EQ(solver.solve(system, spectrum), analysis::Status::kOk);
-    const double margin = analysis::gain_margin(system, spectrum, loop, 1e4);
-    ASSERT_GT(margin, 1e-3);
-    ASSERT_LT(margin, 1e4);
-    const MatrixXd none = MatrixXd::Zero(n, n);
-    const Matrices whole{system.mass, system.damping, system.stiffness};
-    const Matrices alone = textbook(model, q, none, none);
-    const bool link = sensor == PositionSensor::kLink;
-    EXPECT_LT(spectral_radius(whole, alone, gravity, link, 0.999 * margin, settings.period), 1);
-    EXPECT_GT(spectral_radius(whole, alone, gravity, link, 1.001 * margin, settings.period), 1);
-  }
 }
 
 /// What a controller of the same gains has at rest.

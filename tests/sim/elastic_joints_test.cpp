@@ -1,28 +1,23 @@
-// Arms whose gears bend: what two masses on a spring do, what is kept, and the loop that is closed
-// over them, beside matrices that the controller's model gives.
+// Arms whose gears bend: what two masses on a spring do, and what is kept. The loop that is closed
+// over them is in elastic_prediction_test.cpp.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/sim/scenes.hpp>
 #include <dashpot/tests/support/arms.hpp>
-#include <dashpot/tests/support/elastic_loop.hpp>
-#include <dashpot/tests/support/released_arm.hpp>
+#include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <complex>
 #include <cstdio>
 #include <functional>
 #include <limits>
 #include <string>
-#include <unsupported/Eigen/MatrixFunctions>
-#include <vector>
 
 namespace dashpot::sim {
 namespace {
 
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::joints;
 using testing::precise;
@@ -211,128 +206,6 @@ TEST(ElasticArm, MovesAlikeWithAllIntegrators) {
   EXPECT_LT(off(Method::kRosenbrock, 0.001, 1e-9), 1e-8);
   EXPECT_LT(off(Method::kImplicitMidpoint, 1e-6, 0), 1e-8);
   EXPECT_LT(off(Method::kSemiImplicitEuler, 1e-7, 0), 1e-6);
-}
-
-// ------------------------------------------------------ the closed loop from one tick to the next
-
-/// A loop on gears, and its map of the state x = (q, deflections, their rates) in a period under
-/// the held torque u = g(q0) - K_p (shown - q0) - K_d shown'.
-struct TickMap {
-  testing::Arm file;
-  PositionSensor sensor;
-  double stiffness;
-  bool mixed;  ///< every third gear is rigid
-
-  static constexpr double kPeriod = 0.001;
-
-  RobotParameters parameters(Eigen::Index n) const {
-    RobotParameters parameters = gears(n, stiffness, 0.002 * stiffness / 100);
-    for (Eigen::Index i = 0; mixed && i < n; i += 3) parameters.gear_stiffness[i] = kRigid;
-    return parameters;
-  }
-
-  /// Returns the matrix of the linear equations, with M and dg/dq of the controller's model at the
-  /// links' q.
-  MatrixXd expected(const controller::RobotModel& model, const JointVector& q, const MatrixXd& K_p,
-                    const MatrixXd& K_d) const {
-    const Eigen::Index n = q.size();
-    const RobotParameters given = parameters(n);
-    const JointVector none = JointVector::Zero(n);
-    MatrixXd G(n, n), M = controller::evaluate(model, q, none).M;
-    std::vector<Eigen::Index> elastic;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const JointVector step = 1e-5 * JointVector::Unit(n, i);
-      G.col(i) = (controller::evaluate(model, q + step, none).gravity -
-                  controller::evaluate(model, q - step, none).gravity) /
-                 2e-5;
-      if (std::isinf(given.gear_stiffness[i])) {
-        M(i, i) += given.reflected_inertia[i];
-      } else {
-        elastic.push_back(i);
-      }
-    }
-    const auto e = static_cast<Eigen::Index>(elastic.size()), N = n + e;
-    MatrixXd S = MatrixXd::Zero(e, n);
-    for (Eigen::Index k = 0; k < e; ++k) S(k, elastic[static_cast<std::size_t>(k)]) = 1;
-    const MatrixXd rigid = MatrixXd::Identity(n, n) - S.transpose() * S;
-    const MatrixXd K = S * given.gear_stiffness.cwiseMin(1e300).asDiagonal() * S.transpose();
-    const MatrixXd D = S * given.gear_damping.asDiagonal() * S.transpose();
-    const MatrixXd B = S * given.reflected_inertia.asDiagonal() * S.transpose();
-    // Forces on (q, theta) of coordinates, rates and torques, then accelerations of deflections.
-    MatrixXd of_position = MatrixXd::Zero(N, N), of_rate = of_position,
-             of_torque = MatrixXd::Zero(N, n);
-    of_position << -G, S.transpose() * K, MatrixXd::Zero(e, n), -K;
-    of_rate << MatrixXd::Zero(n, n), S.transpose() * D, MatrixXd::Zero(e, n), -D;
-    of_torque << rigid, S;
-    MatrixXd inverse = MatrixXd::Zero(N, N);
-    inverse.topLeftCorner(n, n) = M.inverse();
-    inverse.bottomRightCorner(e, e) = B.inverse();
-    MatrixXd difference = MatrixXd::Identity(N, N);
-    difference.bottomLeftCorner(e, n) = -S;
-    const MatrixXd turn = difference * inverse;
-    MatrixXd A = MatrixXd::Zero(2 * N + n, 2 * N + n);
-    A.block(0, N, N, N).setIdentity();
-    A.block(N, 0, N, N) = turn * of_position;
-    A.block(N, N, N, N) = turn * of_rate;
-    A.block(N, 2 * N, N, n) = turn * of_torque;
-    const MatrixXd step = MatrixXd(kPeriod * A).exp();
-    MatrixXd show = MatrixXd::Zero(n, N);
-    show.leftCols(n).setIdentity();
-    if (sensor == PositionSensor::kMotor) show.rightCols(e) = S.transpose();
-    MatrixXd feedback(n, 2 * N);
-    feedback << -K_p * show, -K_d * show;
-    VectorXd scale = VectorXd::Ones(2 * N);
-    scale.tail(N).setConstant(1 / testing::ArmMap::kRate);
-    return scale.asDiagonal() *
-           (step.topLeftCorner(2 * N, 2 * N) + step.topRightCorner(2 * N, n) * feedback) *
-           scale.cwiseInverse().asDiagonal();
-  }
-};
-
-/// Four arms, both sensors, soft and stiff gears, some of them rigid: 32 loops.
-TEST(ElasticLoop, IsThatOfItsLinearEquations) {
-  double worst = 0, worst_frequency = 0;
-  int loops = 0, unstable = 0;
-  for (const testing::Arm& file : testing::arms()) {
-    const controller::RobotModel model = testing::arm_model(file);
-    const testing::TwinModels twin(file);
-    const Eigen::Index n = model.dof();
-    for (int seed = 1; seed <= 8; ++seed) {
-      Random random(static_cast<std::uint64_t>(seed));
-      const TickMap loop{file, seed % 2 == 0 ? PositionSensor::kLink : PositionSensor::kMotor,
-                         random.log_uniform(5e3, 1e5), seed % 4 == 3};
-      const JointVector q0 = random_posture(twin, random);
-      const MatrixXd K_p = 300 * random.spd(n), K_d = 10 * random.spd(n);
-      ArmOptions options;
-      options.position_sensor = loop.sensor;
-      Arm arm(
-          Robot::from_file(testing::arm_path(file.file), file.base, file.tip, loop.parameters(n)),
-          options);
-      const testing::ArmMap map(arm, q0, TickMap::kPeriod, [&](const JointVector& q) {
-        return controller::evaluate(model, q, JointVector::Zero(n)).gravity;
-      });
-      MatrixXd law(n, 2 * n);
-      law << -K_p, -K_d;
-      const MatrixXd seen = map.closed(law, TickMap::kPeriod, 0, 0);
-      const MatrixXd meant = loop.expected(model, map.rest, K_p, K_d);
-      ASSERT_EQ(seen.rows(), meant.rows());
-      const double off = (seen - meant).cwiseAbs().maxCoeff();
-      EXPECT_LT(off, 1e-6) << file << ", " << loop.stiffness << " N m/rad, seed " << seed;
-      worst = std::max(worst, off);
-      const Eigen::VectorXcd z = seen.eigenvalues(), z_meant = meant.eigenvalues();
-      for (const std::complex<double>& one : z_meant) {
-        const double distance = (z.array() - one).abs().minCoeff();
-        worst_frequency = std::max(worst_frequency, distance / std::abs(std::log(one)));
-      }
-      if (z.cwiseAbs().maxCoeff() > 1) ++unstable;
-      ++loops;
-    }
-  }
-  std::printf("%d loops, %d of them unstable: maps within %.1e, eigenvalues within %.1e\n", loops,
-              unstable, worst, worst_frequency);
-  EXPECT_LT(worst_frequency, 1e-5);
-  EXPECT_GT(unstable, 0);
-  EXPECT_LT(unstable, loops);
 }
 
 // ------------------------------------------------------------------------------------- refusals

@@ -178,10 +178,22 @@ void expect_of_tick(const Case& one, const Said& wanted, int& ticked) {
   expect_same_margin(found->gain_margin, wanted.margin);
   EXPECT_NEAR(found->spectral_radius, wanted.sampled.spectral_radius, 1e-9);
   ASSERT_EQ(static_cast<std::size_t>(found->count), wanted.sampled.modes.size());
+  EXPECT_EQ(found->status, analysis::Status::kOk);
+  EXPECT_EQ(found->position, one.q);
   for (std::size_t i = 0; i < wanted.sampled.modes.size(); ++i) {
-    const double frequency = wanted.sampled.modes[i].natural_frequency;
+    const SampledVibrationMode& mode = found->modes[i];
+    const analysis::SampledMode& sampled = wanted.sampled.modes[i];
+    const double frequency = sampled.natural_frequency;
     if (!std::isfinite(frequency)) continue;
-    EXPECT_NEAR(found->modes[i].natural_frequency, frequency, 1e-6 * (1 + frequency));
+    EXPECT_EQ(mode.kind, sampled.kind);
+    EXPECT_NEAR(mode.natural_frequency, frequency, 1e-6 * (1 + frequency));
+    EXPECT_NEAR(mode.damping_ratio, sampled.damping_ratio, 1e-6 * (1 + sampled.damping_ratio));
+    EXPECT_NEAR(mode.damped_frequency, sampled.damped_frequency, 1e-6 * (1 + frequency));
+    const analysis::Mode<>& origin = wanted.modes.modes[static_cast<int>(i)];
+    if (!std::isfinite(origin.natural_frequency)) continue;
+    EXPECT_NEAR(mode.continuous_frequency, origin.natural_frequency,
+                1e-6 * (1 + origin.natural_frequency));
+    EXPECT_NEAR(mode.continuous_ratio, origin.damping_ratio, 1e-6 * (1 + origin.damping_ratio));
   }
   ++ticked;
 }
