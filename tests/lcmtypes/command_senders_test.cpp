@@ -78,16 +78,6 @@ TEST_F(CommandSenders, SilenceIsNoticedWithoutACommand) {
   EXPECT_EQ(shared.tally().accepted(), 1);
 }
 
-TEST_F(CommandSenders, CommandsThatAreRefusedKeepNoArm) {
-  EXPECT_EQ(send_as(1), Verdict::kAccepted);
-  for (int i = 0; i < 10; ++i) {
-    pass(kSilence / 10);
-    EXPECT_EQ(send_parts(1, 0), Verdict::kUnknown);
-  }
-  pass(1);
-  EXPECT_EQ(send_as(2), Verdict::kAccepted);
-}
-
 TEST_F(CommandSenders, OneThatGivesUpIsFollowedAtOnce) {
   EXPECT_EQ(send_as(1), Verdict::kAccepted);
   pass(kMillisecond);

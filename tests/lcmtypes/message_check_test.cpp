@@ -128,49 +128,17 @@ TEST(CommandCheck, ReadsTheSenderFromTheFirstBytes) {
   EXPECT_FALSE(read_sender(nullptr, 100, read));
 }
 
-/// Changes some bytes, favouring the header; cuts; lengthens; repeats a piece.
+/// Changes some bytes, favouring the header; cuts; lengthens.
 Bytes mutated(Random& random, Bytes bytes) {
-  const auto size = [&bytes] { return static_cast<int>(bytes.size()); };
-  const auto place = [&random](int end) {
-    return static_cast<std::size_t>(random.integer(0, std::max(0, end - 1)));
-  };
-  const auto write_random = [&](std::size_t i) {
-    bytes[i] = static_cast<std::uint8_t>(random.integer(0, 255));
-  };
-  for (int k = random.integer(1, 4); k > 0 && !bytes.empty(); --k) {
-    switch (random.integer(0, 6)) {
-      case 0:
-        write_random(place(size()));
-        break;
-      case 1:
-        write_random(8 + place(std::min(size() - 8, 20)));
-        break;
-      case 2:
-        if (size() >= 16) {
-          const std::size_t offset = 8 + 4 * place(2);
-          write_int32(bytes, offset, random.integer(-3, 20));
-        }
-        break;
-      case 3:
-        bytes.resize(place(size()) + 1);
-        break;
-      case 4: {
-        const auto filler = static_cast<std::uint8_t>(random.integer(0, 255));
-        bytes.insert(bytes.end(), place(40), filler);
-        break;
-      }
-      case 5: {
-        const Bytes piece(bytes.begin(),
-                          bytes.begin() + static_cast<std::ptrdiff_t>(place(size())));
-        bytes.insert(bytes.end(), piece.begin(), piece.end());
-        break;
-      }
-      default:
-        for (std::size_t i = place(size()); i < bytes.size(); ++i) {
-          write_random(i);
-        }
+  const auto byte = [&random] { return static_cast<std::uint8_t>(random.integer(0, 255)); };
+  for (int k = random.integer(1, 4); k > 0 && bytes.size() > 8; --k) {
+    const int size = static_cast<int>(bytes.size()), kind = random.integer(0, 4);
+    if (kind == 0) {
+      bytes.resize(static_cast<std::size_t>(random.integer(1, size + 40)), byte());
+    } else {
+      const int first = kind < 3 ? 8 : 0, end = kind < 3 ? std::min(size, 28) : size;
+      bytes[static_cast<std::size_t>(random.integer(first, end - 1))] = byte();
     }
-    if (bytes.size() <= 8) break;
   }
   return bytes;
 }

@@ -35,13 +35,6 @@ class Gains(c.Structure):
                 ("joint_damping_ratio", Doubles), ("null_damping_ratio", Doubles)]
 
 
-class Payload(c.Structure):
-    _fields_ = [("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("mass", c.c_double),
-                ("center", c.c_double * 3), ("inertia", c.c_double * 9),
-                ("tool_position", Doubles), ("tool_rotation", Doubles),
-                ("gains", c.c_void_p)]
-
-
 class Output(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32), ("torque", Doubles)]
 
@@ -84,19 +77,6 @@ class Modes(c.Structure):
                 ("modes", Mode * MAX_JOINTS)]
 
 
-class SampledMode(c.Structure):
-    _fields_ = [("continuous_frequency", c.c_double), ("continuous_ratio", c.c_double),
-                ("natural_frequency", c.c_double), ("damping_ratio", c.c_double),
-                ("damped_frequency", c.c_double), ("kind", c.c_int32), ("reserved", c.c_int32)]
-
-
-class SampledModes(c.Structure):
-    _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32), ("time", c.c_int64),
-                ("tick", c.c_uint64), ("position", c.c_double * MAX_JOINTS),
-                ("spectral_radius", c.c_double), ("gain_margin", c.c_double),
-                ("status", c.c_int32), ("count", c.c_uint32), ("modes", SampledMode * MAX_JOINTS)]
-
-
 class Dynamics(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32),
                 ("mass", c.c_double * MAX_JOINTS ** 2), ("coriolis", c.c_double * MAX_JOINTS),
@@ -133,7 +113,7 @@ class Plugin(c.Structure):
                 ("set_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains))),
                 ("judge_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains), Doubles,
                                             Doubles)),
-                ("set_payload", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Payload))),
+                ("set_payload", c.CFUNCTYPE(c.c_int32, Handle, c.c_void_p)),
                 ("limit_tip_speed", c.CFUNCTYPE(c.c_int32, Handle, c.c_double, c.c_double,
                                                 c.c_double)),
                 ("evaluate", c.CFUNCTYPE(c.c_int32, Handle, Doubles, Doubles, c.POINTER(Dynamics))),
@@ -141,7 +121,7 @@ class Plugin(c.Structure):
                                         c.POINTER(ClosedLoop), c.POINTER(Modes))),
                 ("read_snapshot", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Snapshot))),
                 ("read_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Modes))),
-                ("read_sampled_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(SampledModes))),
+                ("read_sampled_modes", c.CFUNCTYPE(c.c_int32, Handle, c.c_void_p)),
                 ("status_text", c.CFUNCTYPE(c.c_char_p, c.c_int32)),
                 ("needs_brakes", c.CFUNCTYPE(c.c_int32, Handle)),
                 ("kind_text", c.CFUNCTYPE(c.c_char_p, c.c_int32))]

@@ -186,45 +186,21 @@ TEST(CommandReceiver, KeepsTheLastGoodCommandUnderAttack) {
   }
 }
 
-// Several senders at full speed, while the real-time thread reads at every tick: what it reads is
-// always a whole command of the good sender.
-TEST(CommandReceiver, IsNotConfusedByAFlood) {
-  const auto bus = open_bus("memq://");
-  CommandReceiver receiver(bus, patient_limits());
-  Flood flood(*bus, [](std::uint64_t number) {
-    return [engine = std::mt19937_64(962 + number)]() mutable {
-      Bytes bytes(engine() % 2000);
-      for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(engine());
-      return bytes;
-    };
-  });
-  Sender sender(*bus, 966);
-  int came_through = 0;
-  for (int i = 0; i < 50; ++i) {
-    sender.send_good();
-    for (int tick = 0; tick < 5; ++tick) {
-      if (receiver.fetch()) {
-        EXPECT_TRUE(sender.is_one(receiver.command()));
-        ++came_through;
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-  }
-  flood.end();
-  ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));  // it works as before
-  EXPECT_TRUE(sender.is_last(receiver.command()));
-  EXPECT_GT(came_through, 0);
-  EXPECT_GT(receiver.tally().count(Verdict::kMalformed), 100);
-  EXPECT_EQ(receiver.tally().rejected(), receiver.tally().count(Verdict::kMalformed));
-}
-
-// Programs that command without being asked to, at full speed: whoever commands is still heard.
+// Noise, and a program that commands without being asked to, at full speed: whoever commands is
+// still heard, and what the real-time thread reads is always a whole command of that sender.
 TEST(CommandReceiver, HearsTheOneThatCommandsThroughAFloodOfOthers) {
   const auto bus = open_bus("memq://");
   CommandReceiver receiver(bus, patient_limits());
   Sender sender(*bus, 968);
   ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
-  Flood flood(*bus, [](std::uint64_t number) {
+  Flood flood(*bus, [](std::uint64_t number) -> std::function<Bytes()> {
+    if (number == 2) {
+      return [engine = std::mt19937_64(964)]() mutable {
+        Bytes bytes(engine() % 2000);
+        for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(engine());
+        return bytes;
+      };
+    }
     Random random(969);
     command_t message = random_command(random, kJoints);
     message.sender = static_cast<std::int64_t>(number);
@@ -251,9 +227,9 @@ TEST(CommandReceiver, HearsTheOneThatCommandsThroughAFloodOfOthers) {
   const CommandTally tally = receiver.tally();
   EXPECT_EQ(tally.commander, kSender);
   EXPECT_GT(tally.count(Verdict::kOtherSender), 100);
-  EXPECT_EQ(tally.rejected(), tally.count(Verdict::kOtherSender));
-  EXPECT_EQ(receiver.last_reason(), "another sender commands");
-  EXPECT_TRUE(tally.last_refused_sender == 1 || tally.last_refused_sender == 2);
+  EXPECT_GT(tally.count(Verdict::kMalformed), 100);
+  EXPECT_EQ(tally.rejected(),
+            tally.count(Verdict::kOtherSender) + tally.count(Verdict::kMalformed));
 }
 
 // The real-time thread goes on while gains are judged, and sees them only once they have passed.

@@ -207,43 +207,6 @@ TEST(Plugin, TakesASecondSetpointOfTheSameTime) {
   EXPECT_LT(host.snapshot().reference_joint_position[0], panda_posture()[0]);
 }
 
-TEST(Plugin, GoesToAPose) {
-  const Config config = load(panda() + kCartesian);
-  Host host = panda_host(kCartesian);
-  ASSERT_EQ(host.tick(), DASHPOT_OK);
-  const dashpot_snapshot start = host.snapshot();
-  const std::array<double, 3> goal = {start.tip_position[0] + 0.05, start.tip_position[1],
-                                      start.tip_position[2] - 0.1};
-  for (int k = 0; k < 40; ++k) {
-    const dashpot_setpoint setpoint = {sizeof(dashpot_setpoint), 7,       host.time,
-                                       DASHPOT_MODE_CARTESIAN,   nullptr, goal.data(),
-                                       start.tip_rotation,       nullptr};
-    ASSERT_NO_FATAL_FAILURE(run_simulated(config.model, host, 100, &setpoint));
-  }
-  const dashpot_snapshot end = host.snapshot();
-  EXPECT_EQ(end.mode, DASHPOT_MODE_CARTESIAN);
-  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(end.tip_position[i], goal[i], 5e-3);
-  for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(end.tip_rotation[i], start.tip_rotation[i], 2e-2);
-}
-
-TEST(Plugin, WatchesTheAgeOfSetpoints) {
-  Host host = panda_host();
-  const dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
-  ASSERT_EQ(host.tick(&setpoint), DASHPOT_OK);
-  int stale = 0;
-  int lost = 0;
-  for (int tick = 1; tick <= 3000; ++tick) {
-    const std::int32_t status = host.tick();
-    if (stale == 0 && status == DASHPOT_SETPOINT_STALE) stale = tick;
-    if (lost == 0 && status == DASHPOT_SETPOINT_LOST) lost = tick;
-  }
-  EXPECT_NEAR(stale, 501, 1);
-  EXPECT_NEAR(lost, 2001, 1);
-  ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);
-  EXPECT_LT(host.tick(), DASHPOT_SETPOINT_STALE);
-  EXPECT_EQ(host.snapshot().restarts, 2u);
-}
-
 /// Whoever gave the set-point, and whether or not there is one; a repeated one is not a new one.
 TEST(Plugin, StopsUntilThereIsANewSetpoint) {
   for (const char* watchdog : {"", "watchdog: {setpoint_hold: 0, setpoint_damp: 0}\n"}) {
@@ -444,26 +407,6 @@ TEST(Plugin, HasNoModesAfterAReset) {
   }
 }
 
-/// Undamped frequencies grow as the square root of the stiffness: all together by 2^n if it is
-/// four times as high, whatever the damping.
-TEST(Plugin, ChangesGainsAtRunTime) {
-  Host host(create(panda() + "gains: {joint: {stiffness: 100, damping: 5}}\n"), panda_posture());
-  const auto product = [&] {
-    for (int tick = 0; tick < 1000; ++tick) EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
-    double value = 1;
-    const dashpot_modes modes = host.modes();
-    EXPECT_EQ(modes.count, 7u);
-    for (std::uint32_t i = 0; i < modes.count; ++i) value *= modes.modes[i].natural_frequency;
-    return value;
-  };
-  const double before = product();
-  const Eigen::Matrix<double, 7, 7> stiffness = 400 * Eigen::Matrix<double, 7, 7>::Identity();
-  dashpot_gains gains = panda_gains();
-  gains.joint_stiffness = stiffness.data();
-  ASSERT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_OK);
-  EXPECT_NEAR(product() / before, 128, 1e-6);
-}
-
 /// Six modes of the task with the ratio that is held, or with those of a damping matrix again.
 TEST(Plugin, HoldsADampingRatio) {
   Host host(create("robot: {urdf: " + urdf_path("panda.urdf") +
@@ -487,31 +430,16 @@ TEST(Plugin, HoldsADampingRatio) {
   gains.task_damping_ratio = &ratio;
   ASSERT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
   EXPECT_EQ(modes_with(0.4), 6);
-  const Eigen::Matrix<double, 6, 6> C_C = Eigen::Matrix<double, 6, 6>::Identity();
-  gains.task_damping = C_C.data();
-  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);  // one or the other
-  ratio = 0;
-  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
-  EXPECT_EQ(modes_with(0.4), 0);
-  gains.task_damping = nullptr;
   for (const double wrong : {-0.1, 2.1, std::numeric_limits<double>::quiet_NaN()}) {
     ratio = wrong;
     EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
     EXPECT_STREQ(plugin().last_error(), "task_damping_ratio is not between 0 and 2");
   }
-  ratio = 0.9;
-  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
-  EXPECT_EQ(modes_with(0.9), 6);
+  const Eigen::Matrix<double, 6, 6> C_C = Eigen::Matrix<double, 6, 6>::Identity();
   gains.task_damping_ratio = nullptr;
   gains.task_damping = C_C.data();  // ends the ratio
   EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
-  EXPECT_EQ(modes_with(0.9), 0);
-  const Eigen::Matrix<double, 7, 7> C_q = Eigen::Matrix<double, 7, 7>::Identity();
-  gains.joint_damping = C_q.data();
-  gains.joint_damping_ratio = &ratio;
-  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);  // one or the other
-  gains.joint_damping = nullptr;
-  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
+  EXPECT_EQ(modes_with(0.4), 0);
 }
 
 }  // namespace
