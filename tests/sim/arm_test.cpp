@@ -156,6 +156,18 @@ TEST_P(Contacts, AreMetWithinAStepByFixedSteps) {
   }
 }
 
+/// What a step leaves for the next one is of no use where a contact has changed the forces.
+TEST_P(Contacts, AreLandedOnByAdaptiveSteps) {
+  const Bounce expected(height, contact);
+  Arm arm(slider(kDown), options());
+  PlantOptions steps = precise(0.17);
+  steps.integrator.method = Method::kDormandPrince;
+  steps.integrator.absolute_tolerance = 1e-8;
+  Plant plant(arm, steps, joints({height}));
+  ASSERT_EQ(run(plant, 1), Status::kOk);
+  EXPECT_NEAR(plant.position()[0], expected.height(plant.time()), 1e-9);
+}
+
 TEST(Wall, HasNoFrictionAndPushesAlongItsNormalOnly) {
   ArmOptions options;
   options.wall = Wall{Vector3d::Zero(), Vector3d(1, 0, 1), Contact{1e4, 0}};
