@@ -143,17 +143,6 @@ def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
     np.testing.assert_allclose(posture.stiffness - found.stiffness, 5 * N.T @ N, atol=1e-9)
 
 
-def test_the_closed_loops_modes_are_those_of_the_program(program, panda):
-    printed = json.loads(subprocess.check_output(
-        [program, "design", "--urdf", ROOT / "sim/models/panda.urdf", "--base", "panda_link0",
-         "--tip", "panda_hand_tcp", "--q", text(HOME), "--task-stiffness",
-         text(TASK["task_stiffness"]), "--task-damping", text(TASK["task_damping"]),
-         "--damping-ratio", "0.7", "--json"]))
-    found = dashpot.closed_loop(panda, HOME, **TASK).modes
-    before = [mode["natural_frequency"] for mode in printed["before"]["modes"]]
-    np.testing.assert_allclose(found.natural_frequency[:6], before[:6], rtol=2e-3)  # no friction
-
-
 def test_degrees_percent_and_transposed_tools_are_told(panda, config):
     with pytest.warns(UserWarning, match="if these are degrees"):
         panda.mass([0, -45, 0, -135, 0, 90, 45])
