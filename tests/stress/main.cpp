@@ -138,7 +138,7 @@ void add_part(CLI::App& program, const Part& part, Request& request, int& status
 
 void add_all(CLI::App& program, Request& request, std::size_t& at_a_time, int& status) {
   CLI::App& command = *program.add_subcommand(
-      "all", "Run all parts but search and soak, and print what they say in this order");
+      "all", "Run all parts but soak, and print what they say in this order");
   command.add_option("TICKS", request.count, "of the controller")->check(above_zero());
   add_options(command, {"SEED"}, request);
   command.add_option("--jobs", at_a_time, "at a time, or as many as there are processors")

@@ -2,9 +2,9 @@
 // checks every published bound against eigenvalues in long double; what comes near its bound, and
 // every hundredth step besides, against those that FLINT/Arb proves.
 #include <dashpot/tests/stress/part.hpp>
+#include <dashpot/tests/stress/paths.hpp>
 #include <dashpot/tests/support/enclosure.hpp>
 #include <dashpot/tests/support/proved_eigenvalues.hpp>
-#include <dashpot/tests/support/tracker_paths.hpp>
 
 #include <cstdio>
 #include <memory>
@@ -12,14 +12,15 @@
 namespace {
 
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
+using dashpot::stress::kStepsOfAPath;
 using dashpot::testing::judge;
 using dashpot::testing::judge_against;
 using dashpot::testing::PathFamily;
 using dashpot::testing::proved_eigenvalues;
+using dashpot::testing::SystemPath;
 using dashpot::testing::Verdict;
 
 constexpr long kApart = 100;  ///< of the checks by Arb
-constexpr int kStepsOfAPath = 200;
 
 struct Tally {
   long steps = 0, precise = 0, unproved = 0, outside = 0;
@@ -46,10 +47,9 @@ void add(const Tally& from, Tally& to) {
   add(from.counters, to.counters);
 }
 
-/// One path.
-void follow(const PathFamily& family, std::uint64_t seed, int steps, Tally& tally) {
-  dashpot::testing::Dice dice(seed);
-  const auto path = family.make(dice);
+/// One path, made with `seed`.
+void follow(const PathFamily& family, const SystemPath& path, std::uint64_t seed, int steps,
+            Tally& tally) {
   const auto tracker = std::make_unique<ModeTracker>();
   const auto spectrum = std::make_unique<TrackedSpectrum>();
   for (int step = 0; step < steps; ++step) {
@@ -95,20 +95,18 @@ void print(const std::string& name, const Tally& t) {
 }
 
 bool follow_all(const dashpot::stress::Request& request) {
-  const auto& families = dashpot::testing::path_families();
-  const auto count = static_cast<long>(families.size());
-  const long each = (request.whole() + count - 1) / count;
+  const long each = dashpot::stress::steps_of_each(request.whole());
   std::printf("Seed %lu. `digits`: steps judged by FLINT/Arb; the rest in long double.\n",
               request.seed);
   std::printf("%-17s %7s %6s %7s %6s %6s %6s | %5s | %8s %8s\n", "family", "steps", "digits",
               "tracked", "reused", "direct", "failed", "pass", "err/bnd", "widest");
   Tally all;
-  for (const PathFamily& family : families) {
+  for (const PathFamily& family : dashpot::testing::path_families()) {
     Tally tally;
-    std::uint64_t seed = 1'000'003 * request.seed;
-    for (long left = each; left > 0; left -= kStepsOfAPath) {
-      follow(family, seed++, static_cast<int>(std::min<long>(left, kStepsOfAPath)), tally);
-    }
+    dashpot::stress::follow_paths(family, request.seed, each,
+                                  [&](const SystemPath& path, std::uint64_t seed, int steps) {
+                                    follow(family, path, seed, steps, tally);
+                                  });
     print(family.name, tally);
     add(tally, all);
   }
