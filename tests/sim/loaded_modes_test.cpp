@@ -3,6 +3,7 @@
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/base/orientation.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 
