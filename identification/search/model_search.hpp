@@ -16,6 +16,6 @@ FoundModel find_model(const std::vector<MotionRecord>& all, const IdentifyOption
 FoundModel find_model(const ExcitedCells& cells, const IdentifyOptions& options);
 
 /// Refines the model that was found in the beginnings of records on all of them.
-void refine(const ExcitedCells& all, FoundModel& model);
+void refine(const ExcitedCells& all, FoundModel& found);
 
 }  // namespace dashpot::identification
