@@ -1,5 +1,6 @@
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/web/web_site.hpp>
+#include <dashpot/controller/input_error.hpp>
 
 #include <cmath>
 #include <cstdlib>
