@@ -13,8 +13,8 @@
 
 namespace dashpot::apps {
 
-/// The file of the page at a path ("/monitor/main.js"), and its type; nothing at any other path. They are
-/// part of the program.
+/// The file of the page at a path ("/monitor/main.js"), and its type; nothing at any other path.
+/// They are part of the program.
 struct PageFile {
   std::string_view path, type, text;
 };

@@ -176,8 +176,8 @@ TEST(WebMonitor, AnswersGetsOfItsOwnPageAlone) {
 TEST(WebMonitor, ReachesNoFile) {
   const Site site({"--lcm-url", own_url()});
   for (const char* path : {"/../etc/passwd", "/../../../../../../etc/passwd", "//etc/passwd",
-                           "/%2e%2e/%2e%2e/etc/passwd", "/etc/passwd", "/monitor/main.js/..", "/index.html",
-                           "/./", "/main.cpp", "/history"}) {
+                           "/%2e%2e/%2e%2e/etc/passwd", "/etc/passwd", "/monitor/main.js/..",
+                           "/index.html", "/./", "/main.cpp", "/history"}) {
     EXPECT_THAT(site.get(path), StartsWith("HTTP/1.1 404")) << path;
   }
 }
