@@ -127,6 +127,7 @@ int run(int argc, char** argv) {
   add_audit(program);
   add_identify(program);
   add_check_model(program);
+  add_calibrate(program);
   add_run(program);
   add_tune(program);
   add_command(program);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 namespace dashpot::apps {
 namespace {
@@ -17,18 +18,6 @@ using identification::JointCheck;
 using identification::ModelCheck;
 using identification::TorqueKind;
 using Align = TextTable::Align;
-
-/// "12.345 +- 0.012": two digits of the deviation, and as many of the value; "?" if the records do
-/// not narrow the value down.
-std::string estimate_text(const Estimate& one) {
-  if (!std::isfinite(one.deviation)) return "?";
-  const double size = std::max({one.deviation, 1e-9 * std::abs(one.value), 1e-12});
-  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 12);
-  std::array<char, 100> text{};
-  std::snprintf(text.data(), text.size(), "%.*f +- %.*f", decimals, one.value, decimals,
-                one.deviation);
-  return std::string(text.data()) + (one.determined ? "" : " ?");
-}
 
 const char* kind_text(TorqueKind kind) {
   switch (kind) {
@@ -56,25 +45,83 @@ std::string kind_sentence(TorqueKind kind) {
   return "";
 }
 
+/// The unit of revolute joints, of prismatic ones, or both.
+std::string unit_of(const CheckModelReport& report, const char* turns, const char* slides) {
+  const auto count = std::count(report.slides.begin(), report.slides.end(), true);
+  if (count == 0) return turns;
+  if (static_cast<std::size_t>(count) == report.slides.size()) return slides;
+  return std::string(turns) + " (" + slides + ")";
+}
+
 std::string joints_table(const CheckModelReport& report) {
+  const std::string torque = unit_of(report, "N m", "N");
   TextTable table({{Align::kRight, {"", "joint"}},
                    {Align::kLeft, {"", "name"}},
                    {Align::kPoint, {"left over", "before"}},
-                   {Align::kPoint, {"N m", "after"}},
-                   {Align::kLeft, {"offset", "N m"}},
-                   {Align::kLeft, {"Coulomb friction", "N m"}},
-                   {Align::kLeft, {"viscous friction", "N m s/rad"}}});
+                   {Align::kPoint, {torque, "after"}},
+                   {Align::kLeft, {"offset", torque}},
+                   {Align::kLeft, {"Coulomb friction", torque}},
+                   {Align::kLeft, {"viscous friction", unit_of(report, "N m s/rad", "N s/m")}},
+                   {Align::kLeft, {"reflected inertia", unit_of(report, "kg m^2", "kg")}}});
+  if (report.calibrates) {
+    table.add_column(Align::kPoint, {"explained, %", "before"});
+    table.add_column(Align::kPoint, {"", "after"});
+  }
   for (std::size_t i = 0; i < report.joints.size(); ++i) {
     const JointCheck& joint = report.check.joints[i];
-    table.add_row({std::to_string(i + 1), text::printable(report.joints[i]),
-                   format_number(joint.residual_before, 3), format_number(joint.residual_after, 3),
-                   estimate_text(joint.offset), estimate_text(joint.coulomb_friction),
-                   estimate_text(joint.viscous_friction)});
+    std::vector<std::string> row = {std::to_string(i + 1),
+                                    text::printable(report.joints[i]),
+                                    format_number(joint.residual_before, 3),
+                                    format_number(joint.residual_after, 3),
+                                    estimate_text(joint.offset),
+                                    estimate_text(joint.coulomb_friction),
+                                    estimate_text(joint.viscous_friction),
+                                    estimate_text(joint.reflected_inertia)};
+    if (report.calibrates) {
+      row.push_back(format_number(100 * joint.explained_before, 4));
+      row.push_back(format_number(100 * joint.explained_after, 4));
+    }
+    table.add_row(row);
   }
   return table.text();
 }
 
+std::string delay_text(const Estimate& delay) {
+  if (!std::isfinite(delay.deviation)) return "";
+  const Estimate ms{1e3 * delay.value, 1e3 * delay.deviation, delay.determined};
+  return "Delay: the torques act " + estimate_text(ms) + " ms after their times" +
+         (delay.value < 0 ? ", that is, they were measured late\n" : "\n");
+}
+
+/// What the records determine, and what would determine the rest.
+std::string determined_text(const CheckModelReport& report) {
+  const ModelCheck& check = report.check;
+  std::string text = "The records determine " + std::to_string(check.rank) + " of " +
+                     std::to_string(check.parameters) + " parameters, the best " +
+                     format_number(check.condition, 2) + " times better than the worst\n";
+  for (std::size_t i = 0; i < check.joints.size(); ++i) {
+    if (check.joints[i].wanted.empty()) continue;
+    text += "  joint " + std::to_string(i + 1) + ": " + check.joints[i].wanted + "\n";
+  }
+  return text;
+}
+
+std::string modes_text(const CheckModelReport& report) {
+  if (report.modes.empty()) return "";
+  TextTable table(
+      {{Align::kLeft, {"natural frequency", "rad/s"}}, {Align::kLeft, {"damping ratio", ""}}});
+  for (const CalibratedMode& mode : report.modes) {
+    table.add_row({estimate_text({mode.natural_frequency, mode.natural_frequency_std, true}),
+                   estimate_text({mode.damping_ratio, mode.damping_ratio_std, true})});
+  }
+  std::string text = "\nModes of the calibrated loop, at q =";
+  for (const double q : report.rest) text += " " + format_number(q, 3);
+  return text + "\n" + table.text();
+}
+
 std::string payload_text(const ModelCheck& check) {
+  constexpr double kHeldFast = 1e-6;  // kg, of a payload that is said to be known
+  if (check.payload.mass.deviation < kHeldFast) return "Payload: as in the configuration\n";
   std::string text = "Payload: " + estimate_text(check.payload.mass) + " kg";
   const bool known = check.payload.mass.value > 3 * check.payload.mass.deviation;
   if (!known) return text + "\n";
@@ -94,21 +141,42 @@ void put(Json& to, const std::string& name, const Estimate& one) {
 
 }  // namespace
 
+std::string estimate_text(const Estimate& one) {
+  if (!std::isfinite(one.deviation)) return "?";
+  const double size = std::max({one.deviation, 1e-9 * std::abs(one.value), 1e-12});
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 12);
+  std::array<char, 100> text{};
+  std::snprintf(text.data(), text.size(), "%.*f +- %.*f", decimals, one.value, decimals,
+                one.deviation);
+  return std::string(text.data()) + (one.determined ? "" : " ?");
+}
+
 std::string check_model_table(const CheckModelReport& report) {
   const ModelCheck& check = report.check;
-  std::string text = format_number(check.used, 3) + " s of motion, means over " +
-                     format_number(check.window, 2) + " s\n" + kind_sentence(check.kind) + "\n" +
-                     joints_table(report) + "\n" + payload_text(check);
+  std::string text =
+      format_number(check.used, 3) + " s of motion, " +
+      (check.validation > 0
+           ? "the last " + format_number(check.validation, 2) + " of them kept for validation, "
+           : "") +
+      "means over " + format_number(check.window, 2) + " s\n" + kind_sentence(check.kind) +
+      (report.calibrates ? determined_text(report) : "") + "\n" + joints_table(report) + "\n" +
+      payload_text(check) + delay_text(check.delay);
   std::string doubts;
+  constexpr double kLate = 5e-3;  // s: more than drives and their sensors need
+  if (check.delay.value < -kLate && check.delay.value < -4 * check.delay.deviation) {
+    doubts = "  delay: the torques are " + format_number(-1e3 * check.delay.value, 3) +
+             " ms late: is a filter in the way, or are two clocks?\n";
+  }
   if (check.gravity) {
     const Eigen::Vector3d& g = *check.gravity;
     const std::string list =
         format_number(g[0], 3) + ", " + format_number(g[1], 3) + ", " + format_number(g[2], 3);
-    doubts = "  gravity: the torques are " +
-             std::string(check.gravity_fits ? "those" : "nearer to those") +
-             " of an arm with robot.gravity: [" + list + "], not as the model says: " +
-             (check.gravity_fits ? "does it hang from a ceiling, or at a wall?\n"
-                                 : "is its base inclined, or the model wrong otherwise?\n");
+    constexpr double kDegree = 180 / std::numbers::pi;
+    doubts += "  gravity: the torques are " +
+              std::string(check.gravity_fits ? "those" : "nearer to those") +
+              " of an arm with robot.gravity: [" + list + "], not as the model says (+- " +
+              format_number(kDegree * check.gravity_deviation, 2) + " deg): " +
+              (check.gravity_fits ? "how does it hang?\n" : "is the model wrong otherwise?\n");
   }
   for (const std::string& one : check.order) doubts += "  " + one + "\n";
   for (std::size_t i = 0; i < check.joints.size(); ++i) {
@@ -124,6 +192,7 @@ std::string check_model_table(const CheckModelReport& report) {
     text += "  " + report.files[static_cast<std::size_t>(one.record)] + ": " +
             format_number(one.from, 4) + " to " + format_number(one.to, 4) + " s\n";
   }
+  text += modes_text(report);
   if (!report.notes.empty()) text += "\n";
   for (const std::string& note : report.notes) text += "Note: " + note + "\n";
   return text;
@@ -140,10 +209,18 @@ Json check_model_json(const CheckModelReport& report) {
     put(one, "offset", joint.offset);
     put(one, "coulomb_friction", joint.coulomb_friction);
     put(one, "viscous_friction", joint.viscous_friction);
-    one["determined"] = {{"offset", joint.offset.determined},
+    put(one, "reflected_inertia", joint.reflected_inertia);
+    one["determined"] = {{"reflected_inertia", joint.reflected_inertia.determined},
+                         {"offset", joint.offset.determined},
                          {"coulomb_friction", joint.coulomb_friction.determined},
                          {"viscous_friction", joint.viscous_friction.determined}};
     one["moves"] = joint.moves;
+    if (check.validation > 0) {
+      one["explained"] = {{"before", joint.explained_before},
+                          {"after", joint.explained_after},
+                          {"correlation", joint.correlation}};
+    }
+    one["wanted"] = joint.wanted.empty() ? Json() : Json(joint.wanted);
     one["suspicious"] = joint.suspicious.empty() ? Json() : Json(joint.suspicious);
     joints.push_back(std::move(one));
     if (!joint.suspicious.empty()) {
@@ -168,18 +245,38 @@ Json check_model_json(const CheckModelReport& report) {
   payload["center"] = std::move(center);
   payload["center_std"] = std::move(center_std);
   payload["determined"] = determined;
-  return {{"torques", kind_text(check.kind)},
-          {"seconds", check.used},
-          {"window", check.window},
-          {"joints", std::move(joints)},
-          {"payload", std::move(payload)},
-          {"suspicious", std::move(suspicious)},
-          {"order", check.order},
-          {"gravity", check.gravity ? Json(json_list(*check.gravity)) : Json()},
-          {"gravity_fits", check.gravity_fits},
-          {"ambiguities", check.ambiguities},
-          {"left_out", std::move(left_out)},
-          {"notes", report.notes}};
+  Json modes = Json::array();
+  for (const CalibratedMode& mode : report.modes) {
+    modes.push_back({{"natural_frequency", mode.natural_frequency},
+                     {"natural_frequency_std", mode.natural_frequency_std},
+                     {"damping_ratio", mode.damping_ratio},
+                     {"damping_ratio_std", mode.damping_ratio_std}});
+  }
+  Json result = {
+      {"torques", kind_text(check.kind)},
+      {"seconds", check.used},
+      {"window", check.window},
+      {"joints", std::move(joints)},
+      {"payload", std::move(payload)},
+      {"suspicious", std::move(suspicious)},
+      {"order", check.order},
+      {"gravity", check.gravity ? Json(json_list(*check.gravity)) : Json()},
+      {"gravity_fits", check.gravity_fits},
+      {"gravity_std", check.gravity_deviation},
+      {"delay", check.delay.value},
+      {"delay_std", number(check.delay.deviation)},
+      {"delay_determined", check.delay.determined},
+      {"information",
+       {{"parameters", check.parameters}, {"rank", check.rank}, {"condition", check.condition}}},
+      {"ambiguities", check.ambiguities},
+      {"left_out", std::move(left_out)},
+      {"notes", report.notes}};
+  if (report.calibrates) {
+    result["validation"] = check.validation;
+    result["q"] = json_list(report.rest);
+    result["modes"] = std::move(modes);
+  }
+  return result;
 }
 
 }  // namespace dashpot::apps

@@ -8,12 +8,27 @@
 
 namespace dashpot::apps {
 
+/// A mode of the loop with the arm as it was calibrated, and deviations that follow from those of
+/// the parameters.
+struct CalibratedMode {
+  double natural_frequency = 0, natural_frequency_std = 0;  ///< rad/s
+  double damping_ratio = 0, damping_ratio_std = 0;
+};
+
 struct CheckModelReport {
   identification::ModelCheck check;
   std::vector<std::string> files;
   std::vector<std::string> joints;  ///< names
+  std::vector<bool> slides;         ///< prismatic joints: N for N m, kg for kg m^2
   std::vector<std::string> notes;
+  bool calibrates = false;  ///< of `dashpot calibrate`
+  controller::JointVector rest;
+  std::vector<CalibratedMode> modes;  ///< at `rest`, with the gains of the configuration
 };
+
+/// "12.345 +- 0.012": two digits of the deviation, and as many of the value; "?" if the records do
+/// not narrow the value down.
+std::string estimate_text(const identification::Estimate& one);
 
 std::string check_model_table(const CheckModelReport& report);
 nlohmann::ordered_json check_model_json(const CheckModelReport& report);

@@ -6,14 +6,15 @@
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/settings_check.hpp>
 
+#include <filesystem>
 #include <limits>
 #include <sstream>
 
 namespace dashpot::apps {
 
 void take_drives(const std::string& name, controller::ModelOptions& model) try {
-  if (!name.empty()) controller::find_drives(name);
-  model.drives = name;
+  model.drives = controller::drives_name(name, std::filesystem::current_path());
+  if (!name.empty()) controller::find_drives(model.drives);
 } catch (const controller::InvalidModel& error) {
   throw controller::InputError("--drives", error.what());
 }

@@ -9,10 +9,12 @@
 namespace dashpot::apps {
 
 inline constexpr const char* kDrivesHelp =
-    "Public figures of it, with source and doubt in dashpot inspect: panda, fr3, iiwa14, ur5e, ...";
+    "Public figures of it, with source and doubt in dashpot inspect: panda, fr3, iiwa14, ur5e, "
+    "...; "
+    "or a file of dashpot calibrate";
 
-/// Has the model take the published drives of this name, unless it is empty. Throws InputError with
-/// the option --drives.
+/// Has the model take the published drives of this name, or those of a file, unless it is empty.
+/// Throws InputError with the option --drives.
 void take_drives(const std::string& name, controller::ModelOptions& model);
 
 /// Adds the flag --accept-inertias to a command; `accepted` becomes "true", or what is said as in

@@ -30,6 +30,7 @@ void add_design(CLI::App& program);
 void add_audit(CLI::App& program);
 void add_identify(CLI::App& program);
 void add_check_model(CLI::App& program);
+void add_calibrate(CLI::App& program);
 void add_run(CLI::App& program);
 void add_tune(CLI::App& program);
 void add_command(CLI::App& program);

@@ -25,8 +25,8 @@ constexpr double kFades = 0.5;  // and some mode has to lose so much, as an expo
 
 constexpr const char* kNotLinear =
     "most of what explains the motion is no mode, as where joints rub, reach a limit or touch "
-    "something: larger pushes, a measured excitation (--inputs), or check-model for the friction, "
-    "tell more";
+    "something: larger pushes or a measured excitation (--inputs) tell more, and dashpot calibrate "
+    "finds rotors and friction from torques, and the modes that follow";
 
 /// Whether no more modes are rejected as what is not linear than are believed.
 bool is_linear(const identification::Identification& found) {

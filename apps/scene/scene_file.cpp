@@ -54,7 +54,7 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
   controller::Config config = controller::read_config(document, directory);
   const controller::RobotDescription robot = config.robot;
   const Units positions = controller::joint_units(config.model, "rad", "m");
-  ArmSimulation simulation{believed(config), {}};
+  ArmSimulation simulation{believed(config), {}, directory};
   if (config.model.position_sensor() == controller::PositionSensor::kLink) {
     simulation.options.position_sensor = sim::PositionSensor::kLink;
   }

@@ -4,12 +4,15 @@
 #include <dashpot/apps/scene/scene.hpp>
 #include <dashpot/text/setting_reader.hpp>
 
+#include <filesystem>
+
 namespace dashpot::apps {
 
 /// What the simulation of an arm needs besides its options.
 struct ArmSimulation {
   sim::RobotParameters parameters;
   sim::ArmOptions options;
+  std::filesystem::path directory;  ///< of the scene
 };
 
 /// Reads `simulation` of a scene of n joints into `plant`, and for an arm into `arm`; units are

@@ -101,6 +101,7 @@ void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimula
   if (keys.has("drives")) try {
       std::string name;
       read_text(keys, "drives", name);
+      name = controller::drives_name(name, arm.directory);
       const controller::Drives& drives =
           controller::find_drives(name, static_cast<int>(positions.size()));
       parameters.reflected_inertia = drives.values(drives.reflected_inertia);

@@ -88,7 +88,8 @@ void read_gears(const text::YamlMapping& keys, const RobotModel& model, ModelOpt
 }
 
 /// Takes the drives that the keys name into `robot`, and returns its model.
-RobotModel read_drives(const text::YamlMapping& keys, RobotDescription& robot) {
+RobotModel read_drives(const text::YamlMapping& keys, const std::filesystem::path& directory,
+                       RobotDescription& robot) {
   read_switch(keys, "drives_friction", robot.options.drives_friction);
   if (robot.options.drives_friction && !keys.has("drives")) {
     throw keys.error("drives_friction", "needs drives");
@@ -96,6 +97,7 @@ RobotModel read_drives(const text::YamlMapping& keys, RobotDescription& robot) {
   if (!keys.has("drives")) return robot.model();
   std::string name;
   read_text(keys, "drives", name);
+  name = drives_name(name, directory);
   try {
     find_drives(name);
   } catch (const InvalidModel& error) {
@@ -165,7 +167,7 @@ RobotDescription read_robot(const text::YamlMapping& root, const std::filesystem
   if (inertia != nullptr && inertia->items.size() <= kMaxJoints) {
     preliminary.options.reflected_inertia.setOnes(static_cast<Eigen::Index>(inertia->items.size()));
   }
-  const RobotModel model = read_drives(keys, preliminary);
+  const RobotModel model = read_drives(keys, directory, preliminary);
   options.drives = preliminary.options.drives;
   if (keys.has("drives")) options.reflected_inertia = model.joint_values(&Joint::reflected_inertia);
   if (preliminary.options.drives_friction) {

@@ -108,6 +108,7 @@ std::string arm_without_rotors(const RobotModel& model) {
 
 std::string drives_text(const RobotModel& model, const std::string& name) {
   if (name.empty()) return "";
+  if (is_drives_file(name)) return "Drives " + name + ".";
   const Drives* like = drives_like(model);
   return "Drives " + name + ", public figures: " + std::string(find_drives(name).doubt) + "." +
          (like != nullptr && like->name != name
@@ -132,8 +133,7 @@ std::string rotors_hint(const RobotModel& model, const std::string& inertia_opti
                      " takes the inertia of rotor and gear at the joint (rotor times gear ratio "
                      "squared):" +
                      between +
-                     "the maker tells it, `armature` of a MuJoCo model, or dashpot "
-                     "identify --calibrate reflected_inertia.";
+                     "the maker tells it, `armature` of a MuJoCo model, or dashpot calibrate.";
   if (unknown.published == nullptr) {
     std::string names;
     for (const Drives& drives : published_drives()) {

@@ -2,11 +2,13 @@
 #include <dashpot/identification/check_model.hpp>
 #include <dashpot/identification/check_model/hypotheses.hpp>
 #include <dashpot/identification/check_model/joint_order.hpp>
+#include <dashpot/identification/check_model/link_or_payload.hpp>
 #include <dashpot/identification/check_model/robust_fit.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <stdexcept>
 
 namespace dashpot::identification {
@@ -22,6 +24,12 @@ constexpr double kUndetermined = std::numeric_limits<double>::infinity();
 /// says little of its inertia, and must not make the mass uncertain by it.
 constexpr double kPayloadInertia = 0.1;
 constexpr Index kPayloadColumns = 10;
+/// The same of a body of a known mass, beside its size: m from its centre.
+constexpr double kPayloadSize = 0.1;
+constexpr double kFarRotor = 10;      // kg m^2, and over a joint's inertia: no rotor has more
+constexpr double kFarDelay = 0.03;    // s
+constexpr double kKnownRotor = 0.04;  // deviation of a determined rotor, over it
+constexpr double kHeld = 1e-9;        // instead of a prior, of what is known
 
 void check_sizes(const std::vector<TorqueRecord>& records, Index n) {
   if (records.empty()) throw std::invalid_argument("no records");
@@ -49,12 +57,59 @@ std::string number_text(double value, const char* format = "%.2g") {
   return text;
 }
 
+/// Returns the diagonal of M, the mean along runs, kg m^2.
+VectorXd mean_inertia(const controller::RobotModel& model, const std::vector<SmoothRun>& runs) {
+  const controller::DynamicsKernel kernel(model);
+  controller::DynamicsResult at;
+  VectorXd sum = VectorXd::Zero(model.dof());
+  double count = 0;
+  for (const SmoothRun& run : runs) {
+    const Index step = std::max<Index>(1, run.position.cols() / 50);
+    for (Index i = 0; i < run.position.cols(); i += step, ++count) {
+      kernel.evaluate(run.position.col(i), run.velocity.col(i), at);
+      sum += at.M.diagonal();
+    }
+  }
+  return sum / std::max(1.0, count);
+}
+
+/// What a window is for.
+enum class Purpose : std::uint8_t { kFit, kValidation, kNothing };
+
+/// Keeps the end of each record for validation, and windows apart that share samples.
+std::vector<Purpose> purposes(const WeakForm& form, double share) {
+  std::vector<std::pair<double, double>> span;
+  for (const WeakForm::Window& window : form.windows()) {
+    const auto record = static_cast<std::size_t>(window.record);
+    if (record >= span.size()) span.resize(record + 1, {kUndetermined, -kUndetermined});
+    span[record].first = std::min(span[record].first, window.from);
+    span[record].second = std::max(span[record].second, window.to);
+  }
+  std::vector<Purpose> result;
+  for (const WeakForm::Window& window : form.windows()) {
+    const auto [from, to] = span[static_cast<std::size_t>(window.record)];
+    const double border = to - share * (to - from);
+    result.push_back(share == 0 || window.to <= border ? Purpose::kFit
+                     : window.from >= border           ? Purpose::kValidation
+                                                       : Purpose::kNothing);
+  }
+  return result;
+}
+
 /// The parameters and the rows of the fit.
 class Fitting {
  public:
   Fitting(const controller::RobotModel& model, const std::vector<SmoothRun>& runs,
-          const RecordFilter& how, const WeakForm& form)
-      : model_(model), form_(form), n_(model.dof()), K_(form.count()), tau_(form.torque()) {
+          const RecordFilter& how, const WeakForm& form, const ModelCheckOptions& options)
+      : model_(model),
+        form_(form),
+        options_(options),
+        n_(model.dof()),
+        K_(form.count()),
+        tau_(form.torque()),
+        delay_(how.torque_delay),
+        inertia_(mean_inertia(model, runs)),
+        purpose_(purposes(form, options.validation)) {
     own_ = form.torques(controller::DynamicsKernel(model), n_);
     largest_ = tau_.cwiseAbs().rowwise().maxCoeff();
 
@@ -84,10 +139,9 @@ class Fitting {
     const MatrixXd sign = form.sign(v0), velocity = form.velocity();
     for (Index k = 0; k < K_; ++k) {
       for (Index j = 0; j < n_; ++j) {
-        if (!moves_[static_cast<std::size_t>(j)]) {
-          fit_.used[k * n_ + j] = 0;
-          continue;
-        }
+        const bool fitted = purpose_[static_cast<std::size_t>(k)] == Purpose::kFit;
+        if (!fitted || !moves_[static_cast<std::size_t>(j)]) fit_.used[k * n_ + j] = 0;
+        if (!moves_[static_cast<std::size_t>(j)]) continue;
         fit_.A(k * n_ + j, 3 * j) = 1;
         fit_.A(k * n_ + j, 3 * j + 1) = sign(j, k);
         fit_.A(k * n_ + j, 3 * j + 2) = velocity(j, k);
@@ -95,7 +149,14 @@ class Fitting {
     }
     const std::vector<MatrixXd> body = body_columns(model, form, kPayloadColumns);
     for (std::size_t i = 0; i < body.size(); ++i)
-      add(body[i], i < 4 ? kUndetermined : kPayloadInertia);
+      add(body[i], options.payload_known ? kHeld : i < 4 ? kUndetermined : kPayloadInertia);
+    const MatrixXd acceleration = form.acceleration();
+    for (Index j = 0; j < n_; ++j) {
+      MatrixXd own = MatrixXd::Zero(n_, K_);
+      own.row(j) = acceleration.row(j);
+      add(own, kFarRotor * std::max(1.0, inertia_[j]));
+    }
+    add(form.torque_rate(), kFarDelay);
   }
 
   bool anything_moves() const {
@@ -108,16 +169,27 @@ class Fitting {
     model_torque_ = MatrixXd::Zero(n_, K_);
     if (kind != TorqueKind::kExternal) model_torque_ += own_.inertial;
     if (kind == TorqueKind::kWhole) model_torque_ += own_.gravity;
+    for (Index j = 0; j < n_; ++j) {  // rotors are in what external torques leave out
+      fit_.prior[rotor(j)] =
+          kind == TorqueKind::kExternal ? kHeld : kFarRotor * std::max(1.0, inertia_[j]);
+    }
     rest_ = tau_ - model_torque_;
     fit_.y = VectorXd::Map(rest_.data(), rest_.size());
     result_ = robust_fit(fit_);
-    double sum = 0;
-    for (Index j = 0; j < n_; ++j) {
-      // What leaves less than a thousandth over is as good as all others that do.
-      const double size = std::max(result_.sigma[j], 1e-3 * largest_[j]);
-      if (moves_[static_cast<std::size_t>(j)] && size > 0) sum += 2 * std::log(size);
+    return left_over();
+  }
+
+  /// The same for whole torques, with gravity in a direction near that of the robot.
+  double fit_inclined(const controller::RobotDescription& robot) {
+    fit(TorqueKind::kWhole);
+    if (!robot.options.gravity.isZero(0)) {
+      const Index before = fit_.A.cols();
+      for (const MatrixXd& column : tilt_columns(robot, form_)) add(column, kUndetermined);
+      result_ = robust_fit(fit_);
+      fit_.A.conservativeResize(Eigen::NoChange, before);
+      fit_.prior.conservativeResize(before);
     }
-    return sum;
+    return left_over();
   }
 
   /// After a fit, the largest share of a joint's largest torque that is left over.
@@ -130,13 +202,29 @@ class Fitting {
     return most;
   }
 
-  /// After a fit, adds the hypothesis that explains most, as long as one explains much.
-  void explain(const controller::RobotDescription& robot, ModelCheck& check) {
+  /// After a fit, s by which torques act later than their times say, in all.
+  double delay() const { return delay_ + result_.value[delay_index()]; }
+  /// After a fit, whether the rest of the delay is too small for another fit.
+  bool delay_is_taken() const {
+    const double rest = std::abs(result_.value[delay_index()]);
+    return rest < 2e-5 || rest < 0.1 * std::sqrt(result_.covariance(delay_index(), delay_index()));
+  }
+
+  /// After a fit, adds the hypothesis that explains most, as long as one explains much. Returns the
+  /// gravity with which it explains more, if it is that, or if `tilted`.
+  std::optional<Eigen::Vector3d> explain(const controller::RobotDescription& robot, bool tilted,
+                                         ModelCheck& check) {
+    narrow_payload(check);
     hypotheses_ = list_hypotheses(robot, model_, form_, model_torque_);
     if (kind_ != TorqueKind::kWhole) {  // which says little of what the robot holds by itself
-      std::erase_if(hypotheses_, [](const Hypothesis& h) { return h.what == "its torque reads"; });
+      std::erase_if(hypotheses_,
+                    [](const Hypothesis& h) { return h.what == "its torque reads" || h.gravity; });
     }
     check.joints.resize(static_cast<std::size_t>(n_));
+    std::optional<Eigen::Vector3d> gravity;
+    if (tilted && hypotheses_.front().gravity) gravity = tilt(robot, hypotheses_.front(), check);
+    const Hypothesis* first_of_all = check.order.empty() ? best_hypothesis() : nullptr;
+    if (first_of_all == nullptr || !first_of_all->gravity) weigh_link(check);
     const int most = check.order.empty() ? 4 : 0;  // of another arm's motion nothing is explained
     for (int round = 0; round < most; ++round) {
       const Hypothesis* best = best_hypothesis();
@@ -144,27 +232,128 @@ class Fitting {
       const LinearModel before = fit_;
       const RobustFit result_before = result_;
       const Index first = fit_.A.cols();
-      for (const MatrixXd& column : best->columns) add(column, kUndetermined);
-      result_ = robust_fit(fit_);
+      take(*best);
       const std::string reason = reason_for(*best, first, result_before);
+      if (!reason.empty() && best->gravity) return tilted_gravity(robot, first);
       if (reason.empty()) {
         fit_ = before;
         result_ = result_before;
+        taken_.pop_back();
         break;
       }
-      std::string& text = check.joints[static_cast<std::size_t>(best->joint)].suspicious;
-      text += (text.empty() ? "" : "; ") + reason;
-      taken_.push_back(best);
+      suspect(*best, reason, check);
     }
     report(check);
+    return gravity;
   }
 
  private:
+  double left_over() const {
+    double sum = 0;
+    for (Index j = 0; j < n_; ++j) {
+      // What leaves less than a thousandth over is as good as all others that do.
+      const double size = std::max(result_.sigma[j], 1e-3 * largest_[j]);
+      if (moves_[static_cast<std::size_t>(j)] && size > 0) sum += 2 * std::log(size);
+    }
+    return sum;
+  }
+
   void add(const MatrixXd& column, double prior) {
     fit_.A.conservativeResize(Eigen::NoChange, fit_.A.cols() + 1);
     fit_.A.rightCols(1) = VectorXd::Map(column.data(), column.size());
     fit_.prior.conservativeResize(fit_.A.cols());
     fit_.prior[fit_.A.cols() - 1] = prior;
+  }
+
+  Index rotor(Index j) const { return 3 * n_ + kPayloadColumns + j; }
+  Index delay_index() const { return rotor(n_); }
+  Index always() const { return delay_index() + 1; }  ///< parameters without hypotheses
+
+  void take(const Hypothesis& hypothesis) {
+    for (const MatrixXd& column : hypothesis.columns) add(column, kUndetermined);
+    result_ = robust_fit(fit_);
+    taken_.push_back(&hypothesis);
+  }
+
+  static void suspect(const Hypothesis& hypothesis, const std::string& reason, ModelCheck& check) {
+    std::string& text = check.joints[static_cast<std::size_t>(hypothesis.joint)].suspicious;
+    text += (text.empty() ? "" : "; ") + reason;
+  }
+
+  /// Gives the payload's inertia the prior of a body of its mass, and holds rotors that only it is
+  /// told apart from.
+  void narrow_payload(ModelCheck& check) {
+    const Index mass = 3 * n_;
+    const auto sure = [&](Index i) {
+      return std::abs(result_.value[i]) + 2 * std::sqrt(result_.covariance(i, i));
+    };
+    if (!options_.payload_known && !unseen(mass)) {
+      const double m = sure(mass) + 1e-3;
+      const double moment = Eigen::Vector3d(sure(mass + 1), sure(mass + 2), sure(mass + 3)).norm();
+      const double far = std::min(1.0, moment / m);
+      const double inertia = m * (far * far + kPayloadSize * kPayloadSize);
+      fit_.prior.segment<6>(mass + 4).setConstant(std::min(kPayloadInertia, inertia));
+    }
+    for (Index j = 0; j < n_; ++j) {
+      const Index i = rotor(j);
+      const double own = result_.covariance(i, i);
+      for (Index k = mass; k < mass + 4; ++k) {
+        constexpr double kAlike = 0.995;
+        const double both = std::sqrt(own * result_.covariance(k, k));
+        if (!(std::abs(result_.covariance(i, k)) > kAlike * both) || !(both > 0)) continue;
+        if (fit_.prior[i] == kHeld) continue;
+        fit_.prior[i] = kHeld;
+        check.ambiguities.push_back("the records cannot tell apart " + parameter_name(i) + " and " +
+                                    parameter_name(k) + ": the rotor is as the model says");
+      }
+    }
+    result_ = robust_fit(fit_);
+    check.parameters = static_cast<int>((fit_.prior.array() != kHeld).count());
+    check.rank = check.parameters - static_cast<int>(result_.unseen.cols());
+    check.condition = result_.condition;
+  }
+
+  Eigen::Vector3d tilted_gravity(const controller::RobotDescription& robot, Index first) const {
+    const Eigen::Vector3d& before = robot.options.gravity;
+    const Eigen::Vector3d after =
+        before + tilt_directions(before) * result_.value.segment<2>(first);
+    return before.norm() * after.normalized();
+  }
+
+  /// Frees the direction of gravity. Returns it.
+  Eigen::Vector3d tilt(const controller::RobotDescription& robot, const Hypothesis& hypothesis,
+                       ModelCheck& check) {
+    const Index first = fit_.A.cols();
+    take(hypothesis);
+    check.gravity_deviation = std::sqrt(result_.covariance.diagonal().segment<2>(first).mean());
+    return tilted_gravity(robot, first);
+  }
+
+  /// Where a payload is found, asks whether a link of another mass explains as much.
+  void weigh_link(ModelCheck& check) {
+    const LinkOrPayload found = link_or_payload(fit_, result_, hypotheses_, 3 * n_);
+    if (found.link == nullptr || options_.payload_known) return;
+    if (found.clearly) {
+      const Index first = fit_.A.cols();
+      take(*found.link);
+      suspect(*found.link,
+              "it looks as if " + found.link->what + " " + shown_value(*found.link, first) +
+                  ", which explains the torques better than a payload does",
+              check);
+      return;
+    }
+    check.ambiguities.push_back("link or payload: the torques are explained as well if " +
+                                found.link->what + " " + number_text(std::abs(found.mass)) +
+                                " kg " + (found.mass > 0 ? "more" : "less") +
+                                " than the model says as by another payload");
+    spread_ = found.spread;
+  }
+
+  std::string shown_value(const Hypothesis& hypothesis, Index i) const {
+    const double shown = result_.value[i] * hypothesis.factor;
+    return number_text(std::abs(shown)) + " +- " +
+           number_text(std::sqrt(result_.covariance(i, i)) * hypothesis.factor) + " " +
+           hypothesis.unit + (shown > 0 ? " more" : " less") + " than the model says";
   }
 
   VectorXd weights(const RobustFit& fit) const { return fit_.used.cwiseProduct(fit.weight); }
@@ -226,12 +415,7 @@ class Fitting {
     for (Index i = first; i < first + count; ++i) {
       const double value = result_.value[i], deviation = std::sqrt(result_.covariance(i, i));
       largest = std::max(largest, std::abs(value) / deviation);
-      if (count == 1) {
-        const double shown = value * hypothesis.factor;
-        values = number_text(std::abs(shown)) + " +- " +
-                 number_text(deviation * hypothesis.factor) + " " + hypothesis.unit +
-                 (shown > 0 ? " more" : " less") + " than the model says";
-      }
+      if (count == 1) values = shown_value(hypothesis, i);
     }
     Index most = -1;
     double share = 0.8;  // a joint whose residual falls by less gives no reason to speak
@@ -247,7 +431,8 @@ class Fitting {
     return "it looks as if " + hypothesis.what + " " + values + ": joint " +
            std::to_string(most + 1) + " then leaves " +
            number_text(rms(result_.residual, weights(before), most)) + " instead of " +
-           number_text(rms(before.residual, weights(before), most)) + " N m over";
+           number_text(rms(before.residual, weights(before), most)) +
+           (slides(most) ? " N over" : " N m over");
   }
 
   /// Whether something unseen has a share in parameter i.
@@ -255,11 +440,26 @@ class Fitting {
     return result_.unseen.cols() > 0 && result_.unseen.row(i).norm() > 0.01;
   }
 
+  double variance(Index i) const {
+    return result_.covariance(i, i) + (spread_.size() > 0 ? std::pow(spread_[i], 2) : 0);
+  }
+
+  /// All of a joint's rotor.
+  Estimate rotor_estimate(Index j) const {
+    Estimate one;
+    one.value =
+        model_.joints()[static_cast<std::size_t>(j)].reflected_inertia + result_.value[rotor(j)];
+    if (unseen(rotor(j)) || fit_.prior[rotor(j)] == kHeld) return one;
+    one.deviation = std::sqrt(variance(rotor(j)));
+    one.determined = one.deviation < kKnownRotor * one.value;
+    return one;
+  }
+
   Estimate estimate(Index i, double scale) const {
     Estimate one;
     one.value = result_.value[i];
     if (unseen(i)) return one;
-    one.deviation = std::sqrt(result_.covariance(i, i));
+    one.deviation = std::sqrt(variance(i));
     one.determined = one.deviation < std::max(0.5 * std::abs(one.value), 0.02 * scale);
     return one;
   }
@@ -280,10 +480,10 @@ class Fitting {
     const Eigen::Vector3d moment = before.first_moment + result_.value.segment<3>(first + 1);
     check.payload.mass.value = mass;
     if (!unseen(first)) {
-      const double deviation = std::sqrt(result_.covariance(first, first));
+      const double deviation = std::sqrt(variance(first));
       check.payload.mass.deviation = deviation;
       check.payload.mass.determined =
-          deviation < std::max(0.01 * moved_mass(), 0.1 * std::abs(mass));
+          spread_.size() == 0 && deviation < std::max(0.01 * moved_mass(), 0.1 * std::abs(mass));
     }
     for (Index i = 0; i < 3; ++i) {
       Estimate& one = check.payload.center[static_cast<std::size_t>(i)];
@@ -310,7 +510,10 @@ class Fitting {
              std::to_string(i / 3 + 1);
     }
     if (i < 3 * n_ + 4) return kBody[static_cast<std::size_t>(i - 3 * n_)];
-    return i < 3 * n_ + kPayloadColumns ? "the payload's inertia" : "what is suspected";
+    if (i < rotor(0)) return "the payload's inertia";
+    if (i == delay_index()) return "the delay of the torques";
+    return i < delay_index() ? "reflected inertia of joint " + std::to_string(i - rotor(0) + 1)
+                             : "what is suspected";
   }
 
   /// What the records cannot tell apart.
@@ -325,7 +528,9 @@ class Fitting {
     for (Index d = 0; d < result_.unseen.cols(); ++d) {
       std::vector<std::string> names;
       for (Index i = 0; i < result_.unseen.rows(); ++i) {
-        const bool rests = i < 3 * n_ && !moves_[static_cast<std::size_t>(i / 3)];
+        const Index joint = i < 3 * n_ ? i / 3 : i - rotor(0);
+        const bool rests = (i < 3 * n_ || (i >= rotor(0) && i < delay_index())) &&
+                           !moves_[static_cast<std::size_t>(joint)];
         if (!rests && std::abs(result_.unseen(i, d)) > 0.2) names.push_back(parameter_name(i));
       }
       if (names.empty()) continue;
@@ -339,9 +544,12 @@ class Fitting {
                                   " hardly moves: its friction is not known, and may be in its "
                                   "offset");
     }
-    for (Index i = 0; i < 3 * n_ + 4; ++i) {
-      for (Index k = i + 1; k < 3 * n_ + 4; ++k) {
-        if (unseen(i) || unseen(k)) continue;
+    for (Index i = 0; i < always(); ++i) {
+      for (Index k = i + 1; k < always(); ++k) {
+        const auto nuisance = [this](Index at) {
+          return fit_.prior[at] == kHeld || (at >= 3 * n_ + 4 && at < rotor(0)) || unseen(at);
+        };
+        if (nuisance(i) || nuisance(k)) continue;
         const double correlation = result_.covariance(i, k) /
                                    std::sqrt(result_.covariance(i, i) * result_.covariance(k, k));
         if (std::abs(correlation) < 0.97) continue;
@@ -386,6 +594,7 @@ class Fitting {
       joint.moves = moves_[static_cast<std::size_t>(j)];
       if (!joint.moves) {
         report_resting(j, joint);
+        joint.wanted = "nothing: turn it both ways, faster than it did";
         continue;
       }
       joint.residual_before = rms(fit_.y, weight, j);
@@ -393,7 +602,10 @@ class Fitting {
       joint.offset = estimate(3 * j, largest_[j]);
       joint.coulomb_friction = estimate(3 * j + 1, largest_[j]);
       joint.viscous_friction = estimate(3 * j + 2, largest_[j]);
+      joint.reflected_inertia = rotor_estimate(j);
+      validate(j, joint);
       if (check.order.empty()) doubt(j, joint, weight);
+      joint.wanted = wanted(j, joint);
     }
     report_payload(check);
     const Estimate& mass = check.payload.mass;
@@ -404,8 +616,71 @@ class Fitting {
               "the payload that fits has a negative mass: the last links, or the payload of the "
               "configuration, weigh less than the model says";
     }
+    check.delay.value = delay();
+    if (!unseen(delay_index())) {
+      check.delay.deviation = std::sqrt(variance(delay_index()));
+      constexpr double kKnownDelay = 2.5e-4;  // s
+      check.delay.determined =
+          check.delay.deviation < std::max(kKnownDelay, 0.05 * std::abs(delay()));
+    }
+    check.covariance = result_.covariance.topLeftCorner(always(), always());
     report_ambiguities(check);
     report_contacts(check);
+  }
+
+  /// Returns what is not determined of joint j, and which motion would tell.
+  std::string wanted(Index j, const JointCheck& joint) const {
+    std::string text;
+    const auto add_reason = [&text](const std::string& reason) {
+      text += (text.empty() ? "" : "; ") + reason;
+    };
+    if (fit_.prior[rotor(j)] == kHeld) {
+      add_reason("reflected inertia: move it without a payload, or with a known one");
+    } else if (!joint.reflected_inertia.determined) {
+      const Estimate& one = joint.reflected_inertia;
+      const bool seen = one.value > 3 * one.deviation;
+      add_reason(seen
+                     ? "reflected inertia: accelerate " +
+                           number_text(one.deviation / (kKnownRotor * one.value)) + " times as much"
+                     : "reflected inertia, below " +
+                           number_text(std::max(0.0, one.value) + 2 * one.deviation) +
+                           (slides(j) ? " kg" : " kg m^2") + ": accelerate more");
+    }
+    if (!joint.coulomb_friction.determined || !joint.viscous_friction.determined) {
+      add_reason("friction: turn it both ways, slowly and fast");
+    }
+    if (!joint.offset.determined) add_reason("offset: move it at other postures of all joints");
+    return text;
+  }
+
+  /// What the part kept for validation says of joint j.
+  void validate(Index j, JointCheck& joint) const {
+    double count = 0, mean = 0, all = 0, before = 0, after = 0, neighbours = 0, last = 0;
+    const auto each = [&](const auto& visit) {
+      for (Index k = 0; k < K_; ++k) {
+        if (purpose_[static_cast<std::size_t>(k)] == Purpose::kValidation && turning_(j, k) > 0) {
+          visit(k);
+        }
+      }
+    };
+    each([&](Index k) { mean += tau_(j, k), ++count; });
+    mean /= std::max(1.0, count);
+    const controller::Joint& model = model_.joints()[static_cast<std::size_t>(j)];
+    each([&](Index k) {
+      const Index row = k * n_ + j;
+      const double was = fit_.y[row] - fit_.A(row, 3 * j + 1) * model.coulomb_friction -
+                         fit_.A(row, 3 * j + 2) * model.viscous_friction;
+      const double left = result_.residual[row];
+      all += std::pow(tau_(j, k) - mean, 2);
+      before += was * was;
+      after += left * left;
+      neighbours += left * last;
+      last = left;
+    });
+    if (!(all > 0)) return;
+    joint.explained_before = std::max(0.0, 1 - before / all);
+    joint.explained_after = std::max(0.0, 1 - after / all);
+    joint.correlation = after > 0 ? neighbours / after : 0;
   }
 
   /// Reports a joint that hardly moves: an offset alone, which may contain static friction.
@@ -435,6 +710,7 @@ class Fitting {
             " friction is negative: the torque does not belong to this motion, or lags behind it");
       }
     }
+    doubt_rotor(j, joint, say, weight);
     // Torque that varies with the motion, not the offset.
     VectorXd torque(fit_.y.size());
     torque.setZero();
@@ -450,9 +726,30 @@ class Fitting {
     constexpr double kMuch = 0.25;
     if (joint.residual_after > kMuch * varies && joint.suspicious.empty()) {
       say(number_text(joint.residual_after) + " of " + number_text(varies) +
-          " N m of its torque's variation remain unexplained by model, friction, offset and "
+          (slides(j) ? " N" : " N m") +
+          " of its torque's variation remain unexplained by model, friction, offset and "
           "payload");
     }
+  }
+
+  /// Compares the rotor with the model's.
+  template <typename Say>
+  void doubt_rotor(Index j, const JointCheck& joint, const Say& say, const VectorXd& weight) const {
+    const double added = result_.value[rotor(j)];
+    const VectorXd without = result_.residual + fit_.A.col(rotor(j)) * added;
+    const double old = rms(without, weight, j);
+    constexpr double kSmall = 0.005, kShare = 0.8, kClear = 4;
+    if (!(std::abs(added) > kClear * joint.reflected_inertia.deviation)) return;
+    if (old < kSmall * largest_[j] || joint.residual_after > kShare * old) return;
+    say("it looks as if its reflected inertia is " + number_text(std::abs(added)) + " +- " +
+        number_text(joint.reflected_inertia.deviation) + (slides(j) ? " kg" : " kg m^2") +
+        (added > 0 ? " more" : " less") + " than the model says: joint " + std::to_string(j + 1) +
+        " then leaves " + number_text(joint.residual_after) + " instead of " + number_text(old) +
+        (slides(j) ? " N over" : " N m over"));
+  }
+
+  bool slides(Index j) const {
+    return model_.joints()[static_cast<std::size_t>(j)].type == controller::JointType::kPrismatic;
   }
 
   /// A torque, or a torque for a velocity, that is large for joint j.
@@ -467,9 +764,13 @@ class Fitting {
 
   const controller::RobotModel& model_;
   const WeakForm& form_;
+  ModelCheckOptions options_;
   Index n_, K_;
   TorqueKind kind_ = TorqueKind::kWhole;
   MatrixXd tau_;
+  double delay_;
+  VectorXd inertia_;
+  std::vector<Purpose> purpose_;
   WindowTorques own_;
   MatrixXd model_torque_, rest_, turning_;
   VectorXd largest_;
@@ -478,17 +779,74 @@ class Fitting {
   std::vector<Hypothesis> hypotheses_;
   std::vector<const Hypothesis*> taken_;
   RobustFit result_;
+  VectorXd spread_;  ///< how far parameters differ if a link is wrong in place of the payload
 };
 
-}  // namespace
+/// Smoothed records, and the fit of a model to them.
+struct Comparison {
+  Comparison(const controller::RobotModel& model, const std::vector<TorqueRecord>& records,
+             const RecordFilter& how, const ModelCheckOptions& options)
+      : runs(smooth(records, how)), form(runs, how), fitting(model, runs, how, form, options) {}
+  Comparison(const Comparison&) = delete;
+  Comparison& operator=(const Comparison&) = delete;
+  ~Comparison() = default;
 
-ModelCheck check_model(const controller::RobotDescription& robot,
-                       const std::vector<TorqueRecord>& records) {
+  std::vector<SmoothRun> runs;
+  WeakForm form;
+  Fitting fitting;
+};
+
+/// Two in the sum of logarithms is a seventh of the variance at one joint.
+constexpr double kMuchBetter = 2;
+constexpr double kMuchLeft = 0.05;  // of a joint's largest torque
+
+/// Fits again with the torques as much later as they were found to act, until they are.
+std::unique_ptr<Comparison> take_delay(const controller::RobotModel& model,
+                                       const std::vector<TorqueRecord>& records, RecordFilter how,
+                                       const ModelCheckOptions& options, TorqueKind kind,
+                                       std::unique_ptr<Comparison> last) {
+  constexpr double kLongest = 0.1;  // s: longer is no delay, but another motion
+  for (int round = 0; round < 4 && !last->fitting.delay_is_taken(); ++round) {
+    how.torque_delay = last->fitting.delay();
+    if (std::abs(how.torque_delay) > kLongest) break;
+    auto next = std::make_unique<Comparison>(model, records, how, options);
+    if (next->form.count() < kFewestWindows) break;
+    next->fitting.fit(kind);
+    last = std::move(next);
+  }
+  return last;
+}
+
+/// Returns the robot as it hangs from a ceiling or at a wall, if whole torques then fit far better
+/// than `best`.
+std::optional<controller::RobotDescription> hung(const controller::RobotDescription& robot,
+                                                 const Comparison& upright, const RecordFilter& how,
+                                                 const ModelCheckOptions& options, double best) {
+  std::optional<controller::RobotDescription> found;
+  double least = best - kMuchBetter;
+  for (int k = 0; k < 6; ++k) {
+    controller::RobotDescription other = robot;
+    other.options.gravity =
+        (k < 3 ? 1 : -1) * robot.options.gravity.norm() * Eigen::Vector3d::Unit(k % 3) +
+        Eigen::Vector3d::Zero();  // no zero with a sign
+    const controller::RobotModel hanging = other.model();
+    Fitting there(hanging, upright.runs, how, upright.form, options);
+    const double score = there.fit_inclined(other);
+    if (score < least) least = score, found = other;
+  }
+  return found;
+}
+
+/// check_model for a robot whose gravity was changed so many times already; its direction is free
+/// then.
+ModelCheck compare(const controller::RobotDescription& robot,
+                   const std::vector<TorqueRecord>& records, const ModelCheckOptions& options,
+                   int tilts) {
   const controller::RobotModel model = robot.model();
   check_sizes(records, model.dof());
   const RecordFilter how = choose_smoothing(records);
-  const std::vector<SmoothRun> runs = smooth(records, how);
-  const WeakForm form(runs, how);
+  auto comparison = std::make_unique<Comparison>(model, records, how, options);
+  const WeakForm& form = comparison->form;
   if (form.count() < kFewestWindows) {
     throw std::invalid_argument(
         number_text(static_cast<double>(form.count()) * form.width() / 2) +
@@ -499,60 +857,72 @@ ModelCheck check_model(const controller::RobotDescription& robot,
   ModelCheck check;
   check.window = form.width();
   check.used = static_cast<double>(form.count()) * form.width() / 2;
-  Fitting fitting(model, runs, how, form);
+  check.validation = options.validation * check.used;
+  Fitting& fitting = comparison->fitting;
   if (!fitting.anything_moves()) {
     throw std::invalid_argument("no joint moves by more than its noise");
   }
-  // Two in the sum of logarithms is a seventh of the variance at one joint.
-  constexpr double kFarBetter = 2;
-  double best = fitting.fit(TorqueKind::kWhole);
-  for (const TorqueKind kind : {TorqueKind::kWithoutGravity, TorqueKind::kExternal}) {
-    const double score = fitting.fit(kind);
-    if (best - score > kFarBetter) best = score, check.kind = kind;
+  double best = fitting.fit_inclined(robot);
+  if (tilts == 0) {
+    for (const TorqueKind kind : {TorqueKind::kWithoutGravity, TorqueKind::kExternal}) {
+      const double score = fitting.fit(kind);
+      if (best - score > kMuchBetter) best = score, check.kind = kind;
+    }
   }
-  constexpr double kMuchLeft = 0.05;
   fitting.fit(check.kind);
-  if (check.kind != TorqueKind::kWhole || fitting.most_left() > kMuchLeft) {
-    controller::RobotDescription hung = robot;  // from a ceiling, or at a wall
-    double least = best - kFarBetter;
-    bool fits = false;
-    for (int k = 0; k < 6; ++k) {
-      controller::RobotDescription other = robot;
-      other.options.gravity =
-          (k < 3 ? 1 : -1) * robot.options.gravity.norm() * Eigen::Vector3d::Unit(k % 3) +
-          Eigen::Vector3d::Zero();  // no zero with a sign
-      const controller::RobotModel hanging = other.model();
-      Fitting there(hanging, runs, how, form);
-      const double score = there.fit(TorqueKind::kWhole);
-      if (score < least) least = score, hung = other, fits = there.most_left() <= kMuchLeft;
-    }
-    if (least < best - kFarBetter) {
-      ModelCheck there = check_model(hung, records);
-      if (there.kind == TorqueKind::kWhole && there.order.empty()) {
-        there.gravity = hung.options.gravity;
-        there.gravity_fits = fits;
-        return there;
-      }
+  if (tilts == 0 && (check.kind != TorqueKind::kWhole || fitting.most_left() > kMuchLeft)) {
+    if (const auto other = hung(robot, *comparison, how, options, best)) {
+      ModelCheck there = compare(*other, records, options, 1);
+      if (there.order.empty()) return there;
     }
   }
-  const JointOrder order = find_order(model, runs, how);
-  if (!order.joints().empty()) {
+  const JointOrder order = find_order(model, comparison->runs, how);
+  if (tilts < 2 && !order.joints().empty()) {
     // Only with a payload is it certain that no payload is the reason.
-    const std::vector<SmoothRun> changed = order.apply(runs);
+    const std::vector<SmoothRun> changed = order.apply(comparison->runs);
     const WeakForm changed_form(changed, how);
-    if (best - Fitting(model, changed, how, changed_form).fit(order.kind) > kFarBetter) {
+    if (best - Fitting(model, changed, how, changed_form, options).fit(order.kind) > kMuchBetter) {
       check.kind = order.kind;
       check.order = order.changes();
     }
   }
   fitting.fit(check.kind);
-  fitting.explain(robot, check);
+  if (check.order.empty()) {
+    comparison = take_delay(model, records, how, options, check.kind, std::move(comparison));
+  }
+  const auto gravity = comparison->fitting.explain(robot, tilts > 0, check);
+  if (gravity && gravity->allFinite()) {
+    const Eigen::Vector3d& before = robot.options.gravity;
+    const double moved = (*gravity - before).norm() / before.norm();
+    // A direction along an axis is taken for exact where nothing contradicts it.
+    constexpr double kSmallTilt = 0.005, kSettled = 1e-3;  // rad
+    const bool settled =
+        tilts > 1 ? moved < kSettled : moved < std::max(kSmallTilt, 4 * check.gravity_deviation);
+    constexpr int kMostTilts = 6;
+    if (tilts == 0 || (!settled && tilts < kMostTilts)) {
+      controller::RobotDescription tilted = robot;
+      tilted.options.gravity = *gravity;
+      return compare(tilted, records, options, std::max(2, tilts + 1));
+    }
+    check.gravity = tilts > 1 ? *gravity : before;
+    check.gravity_fits =
+        comparison->fitting.most_left() <= kMuchLeft ||
+        std::all_of(check.joints.begin(), check.joints.end(),
+                    [](const JointCheck& joint) { return joint.suspicious.empty(); });
+  }
   if (check.order.empty()) return check;
   for (const Index j : order.joints()) {
     check.joints[static_cast<std::size_t>(j)].suspicious =
         "its columns look exchanged or turned around";
   }
   return check;
+}
+
+}  // namespace
+
+ModelCheck check_model(const controller::RobotDescription& robot,
+                       const std::vector<TorqueRecord>& records, const ModelCheckOptions& options) {
+  return compare(robot, records, options, 0);
 }
 
 }  // namespace dashpot::identification

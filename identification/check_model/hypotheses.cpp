@@ -1,6 +1,8 @@
 #include <dashpot/controller/kdl_chain.hpp>
 #include <dashpot/identification/check_model/hypotheses.hpp>
 
+#include <Eigen/Geometry>
+
 namespace dashpot::identification {
 namespace {
 
@@ -65,23 +67,38 @@ std::vector<MatrixXd> body_columns(const controller::RobotModel& model, const We
   return columns;
 }
 
+Eigen::Matrix<double, 3, 2> tilt_directions(const Eigen::Vector3d& gravity) {
+  Eigen::Matrix<double, 3, 2> directions;
+  directions.col(0) = gravity.unitOrthogonal() * gravity.norm();
+  directions.col(1) = gravity.normalized().cross(directions.col(0));
+  return directions;
+}
+
+std::vector<MatrixXd> tilt_columns(const controller::RobotDescription& robot,
+                                   const WeakForm& form) {
+  std::vector<MatrixXd> columns;
+  const Eigen::Matrix<double, 3, 2> directions = tilt_directions(robot.options.gravity);
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    controller::RobotDescription tilted = robot;
+    tilted.options.gravity = directions.col(i);
+    const controller::RobotModel model = tilted.model();
+    columns.push_back(form.torques(controller::DynamicsKernel(model), model.dof()).gravity);
+  }
+  return columns;
+}
+
 std::vector<Hypothesis> list_hypotheses(const controller::RobotDescription& robot,
                                         const controller::RobotModel& model, const WeakForm& form,
                                         const MatrixXd& model_torque) {
   std::vector<Hypothesis> all;
   const int n = model.dof();
-  const MatrixXd acceleration = form.acceleration();
+  if (!robot.options.gravity.isZero(0)) {
+    all.push_back({0, tilt_columns(robot, form), "gravity is", "", 1, true});
+  }
   for (int j = 0; j < n; ++j) {
-    const controller::Joint& joint = model.joints()[static_cast<std::size_t>(j)];
-    const auto row_alone = [&](const MatrixXd& of) {
-      MatrixXd column = MatrixXd::Zero(n, form.count());
-      column.row(j) = of.row(j);
-      return column;
-    };
-    const bool slides = joint.type == controller::JointType::kPrismatic;
-    all.push_back(
-        {j, {row_alone(acceleration)}, "its reflected inertia is", slides ? "kg" : "kg m^2", 1});
-    all.push_back({j, {row_alone(model_torque)}, "its torque reads", "%", 100});
+    MatrixXd own_torque = MatrixXd::Zero(n, form.count());
+    own_torque.row(j) = model_torque.row(j);
+    all.push_back({j, {std::move(own_torque)}, "its torque reads", "%", 100});
     if (j + 1 == n) break;  // what the last link lacks is part of the payload
     const KDL::Segment& segment = kdl_chain(model).getSegment(static_cast<unsigned>(j));
     const controller::RobotModel part = part_of_arm(robot, model, j);
@@ -94,7 +111,8 @@ std::vector<Hypothesis> list_hypotheses(const controller::RobotDescription& robo
       const MatrixXd bare = sum_of(form.torques(kernel, j + 1));
       kernel.attach(link);
       const MatrixXd own = sum_of(form.torques(kernel, j + 1)) - bare;
-      all.push_back({j, {own / link.mass}, "the mass of link " + name + " is", "kg", 1});
+      all.push_back(
+          {j, {own / link.mass}, "the mass of link " + name + " is", "kg", 1, false, true});
     }
     columns.erase(columns.begin());
     all.push_back({j, std::move(columns), "the centre of mass of link " + name + " is", "", 1});

@@ -14,9 +14,18 @@ struct Hypothesis {
   /// What is said of it: "the mass of link 'a' is", and the unit, with the factor of its value.
   std::string what, unit;
   double factor = 1;
+  bool gravity = false;  ///< tilts it: columns as of tilt_columns
+  bool link_mass = false;
 };
 
-/// A link's mass and where its centre is, reflected inertias, and torques with a wrong scale.
+/// Returns what gravity that is tilted by a radian would add to the torques, n x K each, in the two
+/// directions of tilt_directions.
+std::vector<Eigen::MatrixXd> tilt_columns(const controller::RobotDescription& robot,
+                                          const WeakForm& form);
+/// Returns what a tilt of a radian adds to gravity, for two right angles to it (3 x 2, m/s^2).
+Eigen::Matrix<double, 3, 2> tilt_directions(const Eigen::Vector3d& gravity);
+
+/// A link's mass and where its centre is, the direction of gravity, and torques with a wrong scale.
 /// `model_torque` is n x K.
 std::vector<Hypothesis> list_hypotheses(const controller::RobotDescription& robot,
                                         const controller::RobotModel& model, const WeakForm& form,

@@ -20,6 +20,7 @@ struct Solution {
   VectorXd value;
   MatrixXd inverse, unseen;
   VectorXd scale;
+  double condition;
 };
 
 Solution solve(const LinearModel& model, const VectorXd& root_weight) {
@@ -52,6 +53,7 @@ Solution solve(const LinearModel& model, const VectorXd& root_weight) {
   const MatrixXd root = solution.scale.asDiagonal() * V * inverse.asDiagonal();
   solution.inverse = root * root.transpose();
   solution.unseen = svd.matrixV().rightCols(p - rank);
+  solution.condition = rank > 0 ? s[0] / s[rank - 1] : 0;
   return solution;
 }
 
@@ -76,6 +78,21 @@ VectorXd sizes(const LinearModel& model, const VectorXd& residual) {
     sigma[j] = std::max({median / 0.6745, 1e-6 * largest, 1e-12});
   }
   return sigma;
+}
+
+constexpr double kTukey = 6;  // deviations, beyond which nothing counts
+
+/// Returns by how much the estimate of a joint's parameters moves with its residuals, over what it
+/// would with constant weights w: mean w / mean (w r)'.
+double response(const RobustFit& fit, const VectorXd& row_weight, Index joint) {
+  double weight = 0, slope = 0;
+  for (Index row = joint; row < fit.residual.size(); row += fit.sigma.size()) {
+    if (row_weight[row] <= 0) continue;
+    const double x = std::pow(fit.residual[row] / (kTukey * fit.sigma[joint]), 2);
+    weight += std::pow(std::max(0.0, 1 - x), 2);
+    slope += x < 1 ? (1 - x) * (1 - 5 * x) : 0;
+  }
+  return slope > 0 ? std::min(2.0, weight / slope) : 1;
 }
 
 /// Student's t for 95 % with `degrees` of freedom, over 1.96 (Cornish and Fisher).
@@ -121,31 +138,37 @@ double inflation(const std::vector<double>& residual) {
   return std::max(1.0, sum);
 }
 
-MatrixXd covariance_of(const LinearModel& model, const RobustFit& fit, const VectorXd& row_weight,
+MatrixXd covariance_of(const LinearModel& model, RobustFit& fit, const VectorXd& row_weight,
                        const MatrixXd& inverse) {
   const Index n = model.joints, K = model.y.size() / n, p = model.A.cols();
   const MatrixXd weighted = row_weight.asDiagonal() * model.A;
   const double per_joint = static_cast<double>(p) / static_cast<double>(n);
   MatrixXd scores(p, K), white = MatrixXd::Zero(p, p);
+  fit.inflation = VectorXd::Ones(n);
+  const VectorXd gain =
+      VectorXd::NullaryExpr(n, [&](Index j) { return response(fit, row_weight, j); });
   for (Index k = 0; k < K; ++k) {
-    scores.col(k) = weighted.middleRows(k * n, n).transpose() * fit.residual.segment(k * n, n);
+    scores.col(k) = weighted.middleRows(k * n, n).transpose() *
+                    gain.cwiseProduct(fit.residual.segment(k * n, n));
   }
   for (Index j = 0; j < n; ++j) {
     std::vector<double> residual;
-    double square = 0, count = 0;
+    double square = 0, count = 0, weight = 0;
     MatrixXd own = MatrixXd::Zero(p, p);
     for (Index row = j; row < model.y.size(); row += n) {
       if (row_weight[row] <= 0) continue;
-      residual.push_back(fit.residual[row] * std::sqrt(row_weight[row]));
+      residual.push_back(fit.residual[row] * fit.weight[row] * gain[j]);
       square += residual.back() * residual.back();
       count += 1;
+      weight += row_weight[row];
       own.noalias() += weighted.row(row).transpose() * model.A.row(row);
     }
     if (count == 0) continue;
     // What the fit took from so few residuals that are as good as independent.
-    const double inflated = inflation(residual), independent = count / inflated;
+    const double inflated = fit.inflation[j] = inflation(residual), independent = count / inflated;
     const double left = std::max(2.0, independent - per_joint);
-    white += own * (square / count * inflated * independent / left * std::pow(student(left), 2));
+    const double variance = square / (weight * std::pow(fit.sigma[j], 4));
+    white += own * (variance * inflated * independent / left * std::pow(student(left), 2));
   }
   double degrees = 1;
   MatrixXd meat = long_run_variance(scores, degrees);
@@ -190,7 +213,7 @@ RobustFit robust_fit(const LinearModel& model) {
     const bool far = round < kRounds / 2;
     for (Index row = 0; row < model.y.size(); ++row) {
       const double size = std::abs(fit.residual[row]) / fit.sigma[row % n];
-      const double share = size / 6;
+      const double share = size / kTukey;
       fit.weight[row] = far         ? std::min(1.0, 1.345 / std::max(size, 1e-300))
                         : share < 1 ? std::pow(1 - share * share, 2)
                                     : 0;
@@ -199,6 +222,7 @@ RobustFit robust_fit(const LinearModel& model) {
   fit.covariance = covariance_of(model, fit, row_weight, solution.inverse);
   fit.unseen = solution.unseen;
   fit.scale = solution.scale;
+  fit.condition = solution.condition;
   return fit;
 }
 

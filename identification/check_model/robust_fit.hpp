@@ -25,6 +25,9 @@ struct RobustFit {
   /// nothing about.
   Eigen::MatrixXd unseen;
   Eigen::VectorXd scale;  ///< of parameters: the inverse norm of their weighted columns
+  Eigen::VectorXd
+      inflation;         ///< joints, how many windows count as one, because residuals are alike
+  double condition = 0;  ///< of the columns of norm 1, without unseen directions
 };
 
 /// Least squares with Tukey's weights, each joint in units of its own residuals. What the rows do

@@ -217,7 +217,8 @@ std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const Re
     const TorqueRecord& record = records[number];
     const Index n = record.position.rows();
     Smoother position(samples_of(record.time, record.position), how.half_width);
-    Smoother torque(samples_of(record.time, record.torque), how.half_width);
+    Smoother torque(samples_of(record.time.array() + how.torque_delay, record.torque),
+                    how.half_width);
     const double begin = record.time[0], length = record.time[record.time.size() - 1] - begin;
     const auto count = static_cast<Index>(length / how.step) + 1;
     Index filled = 0;

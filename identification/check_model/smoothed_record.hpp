@@ -10,6 +10,7 @@ struct RecordFilter {
   double half_width = 0;       ///< h, s
   double step = 0;             ///< between two values, s
   Eigen::VectorXd rate_noise;  ///< n, standard deviation of the smoothed velocity, rad/s
+  double torque_delay = 0;     ///< s by which torques act later than their times say
 };
 
 /// A stretch of a record without gaps, smoothed, at evenly spaced times.

@@ -89,6 +89,10 @@ MatrixXd WeakForm::torque() const {
   return means(f_, [](const SmoothRun& run) { return run.torque; });
 }
 
+MatrixXd WeakForm::torque_rate() const {
+  return means(slope_, [](const SmoothRun& run) { return MatrixXd(-run.torque); });
+}
+
 MatrixXd WeakForm::acceleration() const {
   return means(slope_, [](const SmoothRun& run) { return MatrixXd(-run.velocity); });
 }

@@ -26,8 +26,9 @@ class WeakForm {
   Eigen::Index count() const { return static_cast<Eigen::Index>(windows_.size()); }
   double width() const { return width_; }
 
-  /// Means of the runs' torques, weighted by f, n x K.
+  /// Means of the runs' torques, weighted by f, n x K, and of their rates.
   Eigen::MatrixXd torque() const;
+  Eigen::MatrixXd torque_rate() const;
 
   /// The model's torques: -integral f' p - integral f (Mdot qd - C qd), and integral f g. A joint
   /// of the chain that the kernel has not, a chain being shorter, has zeros.

@@ -175,6 +175,7 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
                    Index to) {
   FreeDecay decay{peak, to, {}};
   std::vector<Index> starts;
+  starts.reserve(kRisePoints + std::size(kAfterPeak));
   for (int k = 0; k < kRisePoints; ++k) starts.push_back(from + (peak - from) * k / kRisePoints);
   for (const double share : kAfterPeak) {
     starts.push_back(peak + static_cast<Index>(share * static_cast<double>(to - peak)));

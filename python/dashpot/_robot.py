@@ -150,8 +150,9 @@ class Robot:
         Fingers and other links off the chain count as rigid at their zero position unless
         `include_off_chain` is False. `accept_inertias` takes inertias that no body can have,
         of all links or of those that it names.
-        `drives` names public figures of reflected inertia, see published_drives, whose friction
-        takes the place of the URDF's with `drives_friction`.
+        `drives` names public figures of reflected inertia, see published_drives, or a drives file
+        of `dashpot calibrate` (.yaml), whose friction takes the place of the URDF's with
+        `drives_friction`.
         `reflected_inertia` (n, kg m^2), `viscous_friction` (n, N m s/rad) and `coulomb_friction`
         (n, N m) replace these and the URDF's. Gears bend with `gear_stiffness` (n, N m/rad,
         numpy.inf: rigid) and `gear_damping` (n, N m s/rad) between a motor that has the reflected

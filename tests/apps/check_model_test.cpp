@@ -185,7 +185,7 @@ TEST(CheckModelProgram, WritesTheConfigurationAndKeepsTheRest) {
     EXPECT_THAT(text, HasSubstr(kept));
   }
   EXPECT_THAT(text, HasSubstr("    mass: 1."));
-  EXPECT_THAT(text, HasSubstr("coulomb_friction: [0.8"));
+  EXPECT_THAT(text, HasSubstr("coulomb_friction: [0.79"));
   EXPECT_THAT(text, Not(HasSubstr("0 kg")));
   const Json again = check({file, "--config", written});
   EXPECT_LT(again["joints"][1]["residual_rms"]["before"].get<double>(), 2);  // 5.5

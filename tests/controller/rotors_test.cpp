@@ -7,6 +7,7 @@
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/scratch.hpp>
 
 #include <gmock/gmock.h>
 
@@ -86,6 +87,38 @@ TEST(Drives, AreNamedInAConfiguration) {
       read_config(text::parse_yaml(robot + "fr3, drives_friction: true}"), "").model;
   EXPECT_EQ(rubs.joint_values(&Joint::coulomb_friction), drives.values(drives.coulomb_friction));
   EXPECT_EQ(rubs.joint_values(&Joint::viscous_friction), drives.values(drives.viscous_friction));
+}
+
+TEST(Drives, AreReadFromAFile) {
+  const tests::Scratch scratch;
+  const std::string file =
+      scratch.write("mine.yaml",
+                    "# measured\nreflected_inertia: [0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0]\n"
+                    "coulomb_friction: [1, 1, 1, 1, 1, 1, 0.5]\nsource: my arm\n");
+  EXPECT_EQ(fr3(file).joint_values(&Joint::reflected_inertia)[2], 0.2);
+  EXPECT_EQ(find_drives(file).source, "my arm");
+  EXPECT_EQ(find_drives(file, 7).coulomb_friction[6], 0.5);
+  const std::string robot = "robot: {urdf: " + testing::arm_path("fr3") +
+                            ", base: fr3_link0, tip: fr3_hand_tcp, drives: mine.yaml, "
+                            "drives_friction: true}";
+  const RobotModel model =
+      read_config(text::parse_yaml(robot), std::filesystem::path(file).parent_path()).model;
+  EXPECT_EQ(model.joint_values(&Joint::coulomb_friction)[0], 1);
+  scratch.write("mine.yaml", "reflected_inertia: [0.4, 0.3, 0.2, 0.2, 0.1, 0.1, 0]\n");
+  EXPECT_EQ(find_drives(file).reflected_inertia[0], 0.4);  // read again
+  const auto refusal = [&](const std::string& text) {
+    try {
+      find_drives(scratch.write("bad.yaml", text), 7);
+    } catch (const InvalidModel& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(refusal("reflected_inertia: [1, 2]\n"), HasSubstr("have 2 joints, the arm has 7"));
+  EXPECT_THAT(refusal("reflected_inertia: [1, -2]\n"), HasSubstr("bad.yaml: reflected_inertia"));
+  EXPECT_THAT(refusal("coulomb_friction: [1]\n"), HasSubstr("reflected_inertia: missing"));
+  EXPECT_THAT(refusal("rotors: [1]\n"), HasSubstr("rotors"));
+  EXPECT_THROW(find_drives(scratch.path("none.yaml")), InvalidModel);
 }
 
 TEST(Rotors, OfAModelWithoutAreNamed) {

@@ -75,7 +75,7 @@ inline const std::vector<Room>& rooms() {
        {"robot_types", "tick_status", "settings", "snapshot", "latest", "input_error"},
        {kAnalysis, kText, kEigen}},
       {"controller/model",
-       1,
+       2,
        {"attachment", "robot_model", "robot_description", "kdl_chain", "dynamics",
         "default_settings", "drives", "posture"},
        {kText, kEigen, "kdl/", "urdf_", "console_bridge/"}},

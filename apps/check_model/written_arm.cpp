@@ -1,0 +1,176 @@
+#include <dashpot/apps/check_model/config_change.hpp>
+#include <dashpot/apps/check_model/written_arm.hpp>
+#include <dashpot/apps/cli/output_file.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+namespace dashpot::apps {
+namespace {
+
+using controller::Config;
+using controller::Joint;
+using controller::JointVector;
+using identification::Estimate;
+using identification::JointCheck;
+using identification::ModelCheck;
+
+/// Where a figure is: in a check, in a model, and in YAML.
+struct FigurePlace {
+  Estimate JointCheck::*found;
+  double Joint::*known;
+  const char* key;
+};
+
+FigurePlace place_of(ArmFigure figure) {
+  switch (figure) {
+    case ArmFigure::kReflectedInertia:
+      return {&JointCheck::reflected_inertia, &Joint::reflected_inertia, "reflected_inertia"};
+    case ArmFigure::kViscousFriction:
+      return {&JointCheck::viscous_friction, &Joint::viscous_friction, "viscous_friction"};
+    case ArmFigure::kCoulombFriction:
+      break;
+  }
+  return {&JointCheck::coulomb_friction, &Joint::coulomb_friction, "coulomb_friction"};
+}
+
+constexpr std::array kFigures = {ArmFigure::kReflectedInertia, ArmFigure::kViscousFriction,
+                                 ArmFigure::kCoulombFriction};
+
+std::string yaml_list(const Eigen::VectorXd& values) {
+  std::string text;
+  for (const double value : values) {
+    char number[40];
+    std::snprintf(number, sizeof number, "%.5g", value);
+    text += (text.empty() ? "" : ", ") + std::string(number);
+  }
+  return "[" + text + "]";
+}
+
+/// Date, records and deviations, lines of a comment.
+std::string origin(const CheckModelReport& report) {
+  const auto today = std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now());
+  const std::chrono::year_month_day date(today);
+  char day[40];
+  std::snprintf(day, sizeof day, "%d-%02u-%02u", static_cast<int>(date.year()),
+                static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()));
+  std::string text = std::string("# dashpot calibrate, ") + day + ", from";
+  for (const std::string& file : report.files) {
+    text += " " + controller::one_line(std::filesystem::path(file).filename().string());
+  }
+  text += "\n# One standard deviation; ? was not determined and is as it was before:\n";
+  for (const ArmFigure figure : kFigures) {
+    const FigurePlace place = place_of(figure);
+    text += std::string("#   ") + place.key + ":";
+    for (const JointCheck& joint : report.check.joints) {
+      const Estimate& one = joint.*place.found;
+      char number[40];
+      std::snprintf(number, sizeof number, " %.2g", one.deviation);
+      text += one.determined ? number : " ?";
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+void refuse_doubtful(const std::string& option, const ModelCheck& check) {
+  if (!check.order.empty()) {
+    throw InputError(option, "nothing is written, because " + check.order.front());
+  }
+  if (check.gravity && !check.gravity_fits) {
+    throw InputError(option,
+                     "nothing is written, because no direction of robot.gravity fits: how is the "
+                     "base inclined?");
+  }
+}
+
+std::vector<ConfigChange> changes_for(const std::string& from_file, const std::string& to_file,
+                                      const Config& config, const CheckModelReport& report) {
+  namespace fs = std::filesystem;
+  const ModelCheck& check = report.check;
+  std::vector<ConfigChange> changes;
+  for (const ArmFigure figure : kFigures) {
+    if (figure == ArmFigure::kReflectedInertia && !report.calibrates) continue;
+    const JointVector values = determined(config, check, figure);
+    if (figure == ArmFigure::kReflectedInertia && values.isZero(0)) continue;
+    changes.push_back({{"robot", place_of(figure).key}, yaml_list(values)});
+  }
+  if (check.gravity) changes.push_back({{"robot", "gravity"}, yaml_list(*check.gravity)});
+  if (const auto payload = determined_payload(check)) {
+    const std::string mass = yaml_list(Eigen::VectorXd::Constant(1, payload->mass));
+    changes.push_back({{"robot", "payload", "mass"}, mass.substr(1, mass.size() - 2)});
+    changes.push_back({{"robot", "payload", "center"}, yaml_list(payload->center)});
+  }
+  const fs::path from = fs::absolute(from_file).parent_path().lexically_normal();
+  const fs::path to = fs::absolute(to_file).parent_path().lexically_normal();
+  if (from != to) {
+    const std::string urdf = fs::relative(config.robot.urdf, to).generic_string();
+    changes.push_back({{"robot", "urdf"}, nlohmann::json(urdf).dump()});
+  }
+  return changes;
+}
+
+void write(const std::string& option, const std::string& path, const std::string& text) {
+  OutputFile file(option, path);
+  file.write(text);
+  file.finish();
+}
+
+}  // namespace
+
+JointVector determined(const Config& config, const ModelCheck& check, ArmFigure figure) {
+  const FigurePlace place = place_of(figure);
+  JointVector result = config.model.joint_values(place.known);
+  for (std::size_t j = 0; j < check.joints.size(); ++j) {
+    const Estimate& one = check.joints[j].*place.found;
+    if (one.determined) result[static_cast<Eigen::Index>(j)] = std::max(0.0, one.value);
+  }
+  return result;
+}
+
+std::optional<controller::Payload> determined_payload(const ModelCheck& check) {
+  const identification::PayloadCheck& payload = check.payload;
+  const bool center = std::all_of(payload.center.begin(), payload.center.end(),
+                                  [](const Estimate& one) { return one.determined; });
+  if (!payload.mass.determined || !center) return std::nullopt;
+  controller::Payload result;
+  result.mass = payload.mass.value;
+  for (std::size_t i = 0; i < 3; ++i) {
+    result.center[static_cast<Eigen::Index>(i)] = payload.center[i].value;
+  }
+  return result;
+}
+
+void write_config(const std::string& from, const std::string& to, const Config& config,
+                  CheckModelReport& report) {
+  refuse_doubtful("--write", report.check);
+  bool kept = true;
+  const std::string text =
+      changed_config(text::read_regular_file(from), changes_for(from, to, config, report), kept);
+  write("--write", to, (report.calibrates ? origin(report) : "") + text);
+  if (!kept) report.notes.push_back("the comments of " + from + " were not kept");
+}
+
+void write_drives(const std::string& to, const Config& config, const CheckModelReport& report) {
+  refuse_doubtful("--write-drives", report.check);
+  std::string text = origin(report), missing;
+  for (const ArmFigure figure : kFigures) {
+    text += std::string(place_of(figure).key) + ": " +
+            yaml_list(determined(config, report.check, figure)) + "\n";
+  }
+  for (std::size_t j = 0; j < report.joints.size(); ++j) {
+    if (report.check.joints[j].reflected_inertia.determined) continue;
+    missing += (missing.empty() ? "" : ", ") + std::to_string(j + 1);
+  }
+  std::string files = "dashpot calibrate, from";
+  for (const std::string& file : report.files) files += " " + file;
+  text += "source: " + nlohmann::json(files).dump() + "\n";
+  if (!missing.empty()) text += "doubt: the rotors of joints " + missing + " are not determined\n";
+  write("--write-drives", to, text);
+}
+
+}  // namespace dashpot::apps
