@@ -159,10 +159,10 @@ void add_check_model(CLI::App& program) {
 }
 
 void add_calibrate(CLI::App& program) {
-  add_command(program.add_subcommand("calibrate",
-                                     "Rotors, friction, payload, gravity and delay of the torques "
-                                     "from records of ordinary motion"),
-              true);
+  add_command(
+      program.add_subcommand("calibrate",
+                             "Rotors, friction, payload and delay of an arm from ordinary motion"),
+      true);
 }
 
 }  // namespace dashpot::apps

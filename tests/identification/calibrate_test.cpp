@@ -1,6 +1,7 @@
 // What records of arms in MuJoCo say of rotors, delay, gravity and links, where the truth is known.
 #include <dashpot/identification/check_model.hpp>
 #include <dashpot/tests/support/moved_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gmock/gmock.h>
 
@@ -76,6 +77,7 @@ TEST_F(Calibrate, TellsTorquesThatCameLate) {
 }
 
 TEST_F(Calibrate, TellsABaseThatIsInclined) {
+  DASHPOT_SKIP_IF_QUICK();
   Dice dice(13);
   MovedArm arm = short_record(dice);
   arm.gravity = 9.81 * Eigen::Vector3d(0.06, -0.06, -0.9964).normalized();
@@ -88,6 +90,7 @@ TEST_F(Calibrate, TellsABaseThatIsInclined) {
 }
 
 TEST_F(Calibrate, TellsALinkFromAPayload) {
+  DASHPOT_SKIP_IF_QUICK();
   Dice dice(14);
   MovedArm arm = short_record(dice);
   arm.make_heavier(3, 0.25);
