@@ -4,6 +4,7 @@
 #include <dashpot/controller/settings.hpp>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 
 namespace dashpot::apps {

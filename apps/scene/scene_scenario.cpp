@@ -5,6 +5,9 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/posture.hpp>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -17,7 +17,7 @@ double finite_or(double value, double otherwise) {
 }
 
 constexpr double kRatio = 0.7;
-constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 /// The damping of modes at the tip lets their velocities decay no faster than this, 1/s: far from
 /// where torque that is held for a period of 1 ms and arrives one late makes the loop unstable.
@@ -27,7 +27,7 @@ constexpr double kFastestDecay = 200;
 
 bool lacks_efforts(const RobotModel& model) {
   constexpr int kArm = 4;  // joints that make an arm: of a rig of fewer 100 N m will do
-  return model.dof() >= kArm && model.joint_values(&Joint::effort).minCoeff() == kUnlimited;
+  return model.dof() >= kArm && model.joint_values(&Joint::effort).minCoeff() == kNoLimit;
 }
 
 Settings default_settings(const RobotModel& model) {
@@ -38,7 +38,7 @@ Settings default_settings(const RobotModel& model) {
   Limits& limits = settings.limits;
   limits.torque = limits.torque_rate = limits.velocity = none;
   limits.position_lower = limits.position_upper = none;
-  limits.external_torque = JointVector::Constant(n, kUnlimited);
+  limits.external_torque = JointVector::Constant(n, kNoLimit);
   JointVector middle = none;
   for (int i = 0; i < n; ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
