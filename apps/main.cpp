@@ -125,6 +125,7 @@ int run(int argc, char** argv) {
   add_export(program);
   add_design(program);
   add_audit(program);
+  add_contact(program);
   add_identify(program);
   add_check_model(program);
   add_calibrate(program);

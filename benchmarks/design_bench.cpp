@@ -7,6 +7,9 @@
 // one thread, design/map/n only judges one there; items_per_second counts configurations.
 // design/loop/n/d is one for a sampled loop with friction, a low-pass and d ticks of delay, which
 // bears less than is wanted, and design/hopeless/n/d one where no damping has the margin wanted.
+// contact/limit/n/d is the stiffness that such a loop bears along one direction, and
+// contact/proved/n/d the same with its bracket.
+#include <dashpot/analysis/contact_limit.hpp>
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/analysis/damping_sampled.hpp>
@@ -138,6 +141,22 @@ void sampled(benchmark::State& state, double speed) {
   state.counters["level"] = level;
 }
 
+void contact(benchmark::State& state, bool proved) {
+  const dashpot::analysis::TaskImpedance arm = configurations(state.range(0)).front();
+  const auto design = design_damping(arm, DampingTarget::constant(kRatio));
+  const auto system = to_joint_space(with_damping(arm, design.damping));
+  const auto spectrum = analyze(system);
+  dashpot::analysis::SampledLoop loop;
+  loop.delay = static_cast<int>(state.range(1));
+  dashpot::analysis::Touch touch;
+  touch.direction = arm.jacobian->row(0).transpose();
+  double limit = 0;
+  for (auto _ : state) {
+    limit = contact_limit(system, spectrum, loop, touch, proved).stiffness;
+  }
+  state.counters["limit"] = limit;
+}
+
 /// C_C = Lambda V diag(2 zeta omega) V' Lambda with K_C V = Lambda V diag(omega^2), V' Lambda V =
 /// I.
 template <int N>
@@ -191,6 +210,13 @@ int main(int argc, char** argv) {
             ->Args({n, delay})
             ->Unit(benchmark::kMillisecond);
       }
+    }
+  }
+  for (const int delay : {0, 1}) {
+    for (const bool proved : {false, true}) {
+      benchmark::RegisterBenchmark(proved ? "contact/proved" : "contact/limit", contact, proved)
+          ->Args({7, delay})
+          ->Unit(benchmark::kMillisecond);
     }
   }
   benchmark::RunSpecifiedBenchmarks();

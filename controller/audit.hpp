@@ -152,14 +152,16 @@ class Audit {
   /// Throws like numbers(), and std::invalid_argument without a period.
   analysis::SampledLoop loop(const JointVector& q) const;
 
+  /// Returns the closed loop at q, in the coordinates of its gears, and, with a period, how it is
+  /// sampled. Throws like numbers().
+  LoopAt at(const JointVector& q) const;
+
   /// Designs damping for the stiffness at q, with `ratio` for every mode. Throws
   /// std::invalid_argument for a ratio that is not positive.
   DampingSuggestion suggest(const JointVector& q, double ratio) const;
 
  private:
   DynamicsResult evaluate(const JointVector& q) const;
-  /// Returns the closed loop at q and, with a period, how it is sampled.
-  LoopAt at(const JointVector& q) const;
   std::optional<PostureNumbers> numbers(
       const analysis::System<kMaxJoints>& system,
       const std::function<analysis::SampledLoop()>& sampled) const;

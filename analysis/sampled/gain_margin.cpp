@@ -1,6 +1,7 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/sampled/circle_count.hpp>
+#include <dashpot/analysis/sampled/margin_search.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 
 #include <Eigen/Cholesky>
@@ -14,30 +15,8 @@ namespace {
 
 using Eigen::MatrixXd;
 
-/// Loops with more states are counted, not solved, which takes longer for fewer of them.
-constexpr Eigen::Index kDenseRows = 100;
 /// From one factor to the next that is tried, and the least one.
 constexpr double kFactorStep = 1.25, kLeastMargin = 1e-3;
-
-/// A factor and the excess there, and the eigenvalues that count, where they are solved.
-struct Trial {
-  double factor, excess = 0;
-  Eigen::VectorXcd values = {};
-
-  /// Takes the excess of the eigenvalue nearest to `z`, and returns that: it changes smoothly with
-  /// the factor, where the largest of all has kinks. A trial that is not stable has the largest.
-  Complex follow(Complex z) {
-    if (values.size() == 0) return z;
-    Eigen::Index at = 0;
-    if (!(excess < 0)) {
-      values.cwiseAbs2().maxCoeff(&at);
-      return values[at];
-    }
-    (values.array() - z).abs2().minCoeff(&at);
-    excess = modulus(values[at]) - 1;
-    return values[at];
-  }
-};
 
 /// The loop with `factor` times its stiffness and its controller's damping.
 class ScaledLoop {
@@ -74,16 +53,7 @@ class ScaledLoop {
   Trial at(double factor) const {
     if (counted_) return {factor, counted_->excess(factor)};
     MatrixXd A = free_ + factor * gain_;
-    Trial trial{factor, 0, eigenvalues_of(A)};
-    Eigen::Index count = 0;
-    for (const Complex z : Eigen::VectorXcd(trial.values)) {
-      if (slowest_ > 0 && z != 0.0 && modulus(std::log(z)) < slowest_) continue;
-      trial.values[count++] = z;
-      trial.excess = std::max(trial.excess, modulus(z));
-    }
-    trial.values.conservativeResize(count);
-    trial.excess -= 1;
-    return trial;
+    return Trial::solve(factor, A, slowest_);
   }
   double excess(double factor) const { return at(factor).excess; }
 
@@ -113,40 +83,6 @@ class ScaledLoop {
   std::array<MatrixXd, 3> lost_;  ///< of the energy in a tick, by powers of the factor
   std::optional<CircleCount> counted_;
 };
-
-/// Where the excess changes its sign between two trials, to 1e-7 of the factor: inverse quadratic
-/// interpolation where it is safe, bisection elsewhere (Chandrupatla 1997).
-double boundary(const ScaledLoop& loop, Trial inside, Trial outside) {
-  constexpr double kPrecision = 0.5e-7;
-  Complex z = outside.follow(0);
-  inside.follow(z);
-  Trial a = outside, b = inside, c = inside;
-  double share = 0.5;  // of the way from a to b
-  const double secant = a.excess / (a.excess - b.excess);
-  if (secant > 0 && secant < 1) share = secant;
-  for (;;) {
-    const double least = kPrecision * outside.factor / std::abs(b.factor - a.factor);
-    if (least > 0.5) return 0.5 * (a.factor + b.factor);
-    share = std::clamp(share, least, 1 - least);
-    Trial next = loop.at(a.factor + share * (b.factor - a.factor));
-    z = next.follow(z);
-    if ((next.excess < 0) == (a.excess < 0)) {
-      c = a;
-    } else {
-      c = b;
-      b = a;
-    }
-    a = next;
-    const double xi = (a.factor - b.factor) / (c.factor - b.factor);
-    const double phi = (a.excess - b.excess) / (c.excess - b.excess);
-    share = 0.5;
-    if (phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi) {
-      const double ab = a.excess - b.excess, ac = a.excess - c.excess, bc = b.excess - c.excess;
-      share = a.excess / -ab * c.excess / bc +
-              (c.factor - a.factor) / (b.factor - a.factor) * a.excess / -ac * b.excess / -bc;
-    }
-  }
-}
 
 bool keeps(const SampledDataModel& unit, double margin, double slowest) {
   const ScaledLoop loop(unit, slowest);

@@ -194,6 +194,34 @@ void SampledDataModel::integrate() {
   motion = motion_of_tick(G, D);
 }
 
+void SampledDataModel::touch_zero_modes(const Eigen::VectorXd& a) {
+  const Index r = zero_modes.cols();
+  if (r == 0) return;
+  const Eigen::HouseholderQR<MatrixXd> qr(zero_modes);  // another mass may have made it oblique
+  zero_modes = MatrixXd(qr.householderQ()).leftCols(r);
+  const Eigen::VectorXd touched = zero_modes.transpose() * a;
+  if (!(touched.norm() > 1e-10 * a.norm())) return;
+  const Eigen::HouseholderQR<MatrixXd> free(touched);
+  zero_modes = zero_modes * MatrixXd(free.householderQ()).rightCols(r - 1);
+}
+
+void SampledDataModel::press(const Eigen::VectorXd& a, double stiffness) {
+  touch_zero_modes(stiffness > 0 ? a : Eigen::VectorXd::Zero(n));
+  for (MatrixXd* spring : {&G, &K, &P}) *spring += stiffness * a * a.transpose();
+  integrate();
+}
+
+void SampledDataModel::hold(const Eigen::VectorXd& a) {
+  touch_zero_modes(a);
+  const Eigen::HouseholderQR<MatrixXd> qr(a);
+  const MatrixXd Q = MatrixXd(qr.householderQ()).rightCols(--n);
+  for (MatrixXd* part : {&C, &K, &D, &G, &P, &H}) *part = Q.transpose() * *part * Q;
+  zero_modes = (Q.transpose() * zero_modes).eval();
+  states.position = (states.position * Q).eval();
+  states.output = (Q.transpose() * states.output).eval();
+  integrate();
+}
+
 void SampledDataModel::span_commands() {
   commands.setIdentity(n, n);
   if (n == 0 || (delay == 0 && !filtered())) return;

@@ -46,6 +46,10 @@ struct SampledDataModel {
   /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), u and f by their coordinates
   /// in `commands`, with `factor` times K - P, C - D and the output of w; see sample_loop.
   Eigen::MatrixXd transition(double factor = 1) const;
+  /// Adds a spring of the world, `stiffness` a a' with the direction a (n, in these coordinates).
+  void press(const Eigen::VectorXd& a, double stiffness);
+  /// Leaves the motions with a' y = 0 alone.
+  void hold(const Eigen::VectorXd& a);
   /// Returns a basis of the states along the zero modes that A does not change or only lets drift:
   /// positions, with the compensated gravity in the memory, and velocities that nothing damps.
   Eigen::MatrixXd unit_motions() const;
@@ -63,6 +67,8 @@ struct SampledDataModel {
   void remember(const SampledLoop& loop, const Eigen::MatrixXd& coordinates);
   /// Sets `motion` and `commands`. Zero modes in which gravity is not compensated are none.
   void integrate();
+  /// Leaves the zero modes with a' y = 0, orthonormal.
+  void touch_zero_modes(const Eigen::VectorXd& a);
   void span_commands();
 };
 

@@ -1,5 +1,6 @@
 #include <dashpot/analysis/system.hpp>
 #include <dashpot/apps/audit/audit_report.hpp>
+#include <dashpot/apps/audit/posture_workers.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
@@ -7,15 +8,9 @@
 #include <dashpot/controller/posture.hpp>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <atomic>
-#include <cstdio>
-#include <exception>
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <thread>
-#include <utility>
 #include <vector>
 
 namespace dashpot::apps {
@@ -24,8 +19,6 @@ namespace {
 using controller::Audit;
 using controller::JointVector;
 using controller::PostureNumbers;
-
-constexpr std::int64_t kPosturesAtATime = 64;
 
 /// The postures of a task, by number.
 struct Postures {
@@ -44,57 +37,6 @@ struct Postures {
     for (std::int64_t i = first; i < first + size; ++i) result.push_back(audit.numbers(at(i)));
     return result;
   }
-};
-
-/// The numbers of all postures in order, or of the first ones if the user stops it. Chunks are
-/// handed out in order, so that what is done when the threads end has no gap.
-class Workers {
- public:
-  explicit Workers(const Postures& postures)
-      : postures_(postures), numbers_(static_cast<std::size_t>(postures.count)) {}
-
-  std::vector<PostureNumbers> run(int jobs) {
-    const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
-    const unsigned threads = jobs > 0 ? static_cast<unsigned>(jobs) : processors;
-    std::vector<std::exception_ptr> errors(threads);
-    std::vector<std::thread> pool;
-    for (unsigned i = 0; i < threads; ++i) {
-      pool.emplace_back([this, &error = errors[i], first = i == 0] { work(first, error); });
-    }
-    for (std::thread& thread : pool) thread.join();
-    show_progress(1);
-    for (const std::exception_ptr& error : errors) {
-      if (error) std::rethrow_exception(error);
-    }
-    numbers_.resize(static_cast<std::size_t>(std::min(next_.load(), postures_.count)));
-    return std::move(numbers_);
-  }
-
- private:
-  /// `shows`: whether this thread shows the progress.
-  void work(bool shows, std::exception_ptr& error) {
-    try {
-      while (!stopped_ && !StopSignal::given()) {
-        const std::int64_t first = next_.fetch_add(kPosturesAtATime);
-        if (first >= postures_.count) return;
-        const std::int64_t size = std::min(kPosturesAtATime, postures_.count - first);
-        const std::vector<PostureNumbers> found = postures_.numbers(first, size);
-        std::copy(found.begin(), found.end(), numbers_.begin() + first);
-        if (!shows) continue;
-        show_progress(
-            std::min(0.999, static_cast<double>(next_) / static_cast<double>(postures_.count)));
-      }
-    } catch (...) {
-      error = std::current_exception();
-      stopped_ = true;
-    }
-  }
-
-  StopSignal stop_;  // first, because room for many postures takes a while
-  const Postures& postures_;
-  std::vector<PostureNumbers> numbers_;
-  std::atomic<std::int64_t> next_{0};
-  std::atomic<bool> stopped_{false};
 };
 
 void write_csv(OutputFile& file, const Postures& postures,
@@ -137,7 +79,10 @@ void run_audit(const AuditCommand& command) try {
   const Postures postures{task, audit, command.postures.seed,
                           listed > 0 ? listed : command.postures.samples};
   if (postures.count > 0) {
-    const std::vector<PostureNumbers> numbers = Workers(postures).run(command.jobs);
+    const std::vector<PostureNumbers> numbers =
+        PostureWorkers<PostureNumbers>(postures.count, [&](std::int64_t first, std::int64_t size) {
+          return postures.numbers(first, size);
+        }).run(command.jobs);
     report.interrupted = static_cast<std::int64_t>(numbers.size()) < postures.count;
     report.workspace = controller::summarize(
         audit, numbers, [&postures](std::int64_t i) { return postures.at(i); });

@@ -206,7 +206,7 @@ AuditTask read_task(const AuditCommand& command) {
   return task;
 }
 
-void add_audit_options(CLI::App& command, AuditCommand& options) {
+void add_stated_options(CLI::App& command, AuditCommand& options) {
   const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
     return command.add_option(name, text, help)->option_text(words);
   };
@@ -240,27 +240,33 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
       "dynamic|kinematic (dynamic)")
       ->check(CLI::IsMember({"dynamic", "kinematic"}));
   add_model_options(command, arm);
+  add_loop_options(command, options.timing);
+  arm.posture.add(command);
+  options.postures.add(command);
+  command.add_option("--jobs,--threads", options.jobs, "Threads; 0: one for each processor")
+      ->check(CLI::Range(0, 1024))
+      ->option_text("N (0)");
+  command.add_flag("--json", options.json, "Print JSON instead of tables");
+}
+
+void add_audit_options(CLI::App& command, AuditCommand& options) {
+  add_stated_options(command, options);
   command
       .add_option("--period", options.timing.period,
                   "Of the control loop: computes the gain margin")
       ->transform(control_period())
       ->option_text("S");
-  add_loop_options(command, options.timing);
   command.add_option("--margin", options.margin, "Gain margin that is asked for")
       ->transform(quantity("", 1, 1e6, "a factor of at least 1"))
       ->option_text("G (2)");
   command.add_flag("--no-margin", options.no_margin, "Leave the gain margin out");
-  arm.posture.add(command);
-  options.postures.add(command);
   command.add_option("--damping-ratio", options.damping_ratio, "Wanted of the suggested damping")
       ->transform(damping_ratio())
       ->option_text("Z (F/2, or 0.7)");
-  command.add_option("--jobs,--threads", options.jobs, "Threads; 0: one for each processor")
-      ->check(CLI::Range(0, 1024))
-      ->option_text("N (0)");
-  add("--csv", options.csv, "Write a line for each posture there", "FILE");
-  add("--plot", options.plot, "Draw the ratios there, with gnuplot", "FILE.svg|FILE.png");
-  command.add_flag("--json", options.json, "Print JSON instead of tables");
+  command.add_option("--csv", options.csv, "Write a line for each posture there")
+      ->option_text("FILE");
+  command.add_option("--plot", options.plot, "Draw the ratios there, with gnuplot")
+      ->option_text("FILE.svg|FILE.png");
 }
 
 }  // namespace dashpot::apps

@@ -42,7 +42,10 @@ struct AuditTask {
   std::string drives = {};    ///< name of the published drives that the model has
 };
 
-/// Adds the options to the subcommand; they are written to `options`.
+/// Adds the options of arm, gains, loop and postures to a subcommand, and --json; they are written
+/// to `options`.
+void add_stated_options(CLI::App& command, AuditCommand& options);
+/// Adds these and the other options of `dashpot audit`.
 void add_audit_options(CLI::App& command, AuditCommand& options);
 
 /// Throws InputError for options that do not go together, and for what is wrong in one of them.

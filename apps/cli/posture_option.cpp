@@ -27,6 +27,7 @@ JointVector PostureOption::read(const RobotModel& model) const {
     check("--q", model, posture);
   }
   const std::string heavy = controller::too_heavy(model, posture);
+  if (!heavy.empty() && has_to_hold) throw InputError("--q", heavy);
   if (!heavy.empty()) print_error("warning: --q: " + heavy);
   return posture;
 }

@@ -14,6 +14,7 @@ struct PostureOption {
   std::string q;                ///< empty: controller::default_posture
   bool outside_limits = false;  ///< take what is outside the position limits, with a warning
   double refused = 1e-3;        ///< rad or m outside them, from where on it is refused otherwise
+  bool has_to_hold = false;     ///< refuse a posture that the arm cannot hold, or warn
 
   /// Adds --q and --outside-limits.
   void add(CLI::App& command);

@@ -28,6 +28,7 @@ void add_monitor(CLI::App& program);
 void add_export(CLI::App& program);
 void add_design(CLI::App& program);
 void add_audit(CLI::App& program);
+void add_contact(CLI::App& program);
 void add_identify(CLI::App& program);
 void add_check_model(CLI::App& program);
 void add_calibrate(CLI::App& program);

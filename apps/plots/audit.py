@@ -127,4 +127,5 @@ def main():
     table(["name", "reflected inertia of the joints, kg m^2", "source", "doubt"], *map(drives_row, DRIVES))
 
 
-main()
+if __name__ == "__main__":
+    main()

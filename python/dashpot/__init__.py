@@ -14,7 +14,8 @@ __build__ = _load_core()  # for which processors the code in use was compiled
 from ._analysis import (  # isort: skip
     DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities, design_damping, modes, receptance, response,
     sampled_modes, sensitivities)
-from ._audit import Audit, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit, audit
+from ._audit import (
+    Audit, Contact, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit, audit, contact)
 from ._controller import Controller, Setpoint, Snapshot, Status, TrackedModes, TrackedSampledModes
 from ._core import Error
 from ._identification import Identification, MeasuredModes, identify
@@ -24,10 +25,10 @@ from ._results import Modes
 from ._robot import ClosedLoop, Robot, closed_loop, published_drives
 
 __version__ = _version("dashpot")
-__all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggestion",
+__all__ = ["Audit", "ClosedLoop", "Contact", "Controller", "DampingDesign", "DampingSuggestion",
            "Distribution", "Error", "Gradients", "Identification", "Log", "LoggedMode",
            "MeasuredModes", "Miss", "Modes",
            "PostureAudit", "RegionDesign", "Response", "Robot", "SampledModes", "Sensitivities",
            "Setpoint", "Snapshot", "Status", "TrackedModes", "TrackedSampledModes",
-           "WorkspaceAudit", "audit", "closed_loop", "design_damping", "design_region", "identify",
+           "WorkspaceAudit", "audit", "closed_loop", "contact", "design_damping", "design_region", "identify",
            "modes", "published_drives", "read_log", "receptance", "response", "sampled_modes", "sensitivities"]

@@ -89,6 +89,46 @@ class DampingSuggestion(Result):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Contact(Result):
+    """What an arm may touch with its tip, press and hold."""
+
+    q: Array
+    """n, rad."""
+    direction: Array
+    """3, of length 1, in the base's axes."""
+    limit: float
+    """Stiffness up to which the loop is stable, N/m; 0: it is not in the air, infinite: above 1e9."""
+    limit_lower: float
+    """Stable with it, N/m, proved; NaN if nothing could be proved."""
+    limit_upper: float
+    """Unstable with it, N/m, proved."""
+    frequency: float
+    """Of the motion that begins to grow there, rad/s."""
+    stable_if_rigid: bool
+    """Stable where what is touched does not give way at all."""
+    with_half_stiffness: float
+    """The limit with half of the stiffness, N/m."""
+    with_more_damping: float
+    """The limit with 1.5 times the damping, N/m."""
+    with_less_delay: float
+    """The limit with a tick less of delay, N/m; NaN without delay."""
+    passive: bool
+    """Stable against everything that is passive."""
+    missing_friction: float
+    """Viscous friction that each joint lacks for that below the Nyquist frequency, N m s/rad."""
+    weight: Array
+    """n, torque against gravity, N m."""
+    effort: Array
+    """n, its limit, N m; 0 where it is not known."""
+    forces: Array
+    """8 x 6: direction in which the tip presses (3), force until a joint is at its limit (N), how far
+    the springs are then pressed in (m), and that joint, from 0; -1: none."""
+    curve: Array
+    """s x 3, for each stiffness asked for: the stiffness (N/m), the least damping ratio, and the
+    natural frequency of that motion (rad/s)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Audit(Result):
     """What `audit` found; None where it was not asked."""
 
@@ -138,6 +178,55 @@ def _measured(robot: Robot, joints: Mapping[str, Any]) -> Array:
     return complete
 
 
+def _task(robot: Robot, *, task_stiffness: npt.ArrayLike | None = None,
+          task_damping: npt.ArrayLike | None = None, damping_factor: float | None = None,
+          null_stiffness: npt.ArrayLike | None = None, null_damping: npt.ArrayLike | None = None,
+          null_projector: str = "dynamic", joint_stiffness: npt.ArrayLike | None = None,
+          joint_damping: npt.ArrayLike | None = None, frame: str = "base",
+          directions: Sequence[str] = DIRECTIONS, half_quaternion: bool = False,
+          inertia_blocks: bool = False, period: float = 0, delay: int = 0, cutoff: float = 0,
+          difference_velocity: bool = False, integral_time: float = 0, ideal_gravity: bool = False,
+          margin: float = 2, soft_frequency: float = 0.1, lower: npt.ArrayLike | None = None,
+          upper: npt.ArrayLike | None = None, outside_limits: bool = False,
+          urdf_friction: bool = False) -> Task:
+    """Returns the task of the gains and the loop that `audit` describes."""
+    if null_projector not in ("dynamic", "kinematic"):
+        raise Error(f"null_projector: {null_projector!r} is none of dynamic, kinematic")
+    at_tip = joint_stiffness is None and joint_damping is None
+    if not at_tip and not (task_stiffness is None and task_damping is None):
+        raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
+    factor_of = (damping_factor, None) if at_tip else (None, damping_factor)
+    if not float(delay).is_integer():
+        raise Error(f"delay: {delay} is no whole number of ticks; is it in s?")
+    chosen = selected(directions)
+    stiffness = to_gain("task_stiffness", task_stiffness)
+    damping = _damping(task_stiffness, task_damping, factor_of[0], "task_damping")
+    if at_tip and not all(chosen):
+        keep = np.outer(chosen, chosen)
+        stiffness = None if stiffness is None else stiffness * keep
+        damping = None if damping is None else damping * keep
+    gains = gains_text(
+        joint_stiffness=joint_stiffness, task_stiffness=stiffness, task_damping=damping,
+        joint_damping=_damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"),
+        null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
+    options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
+                               "kinematic_null_space": null_projector == "kinematic",
+                               "period": float(period), "delay": delay, "cutoff": float(cutoff),
+                               "difference_velocity": difference_velocity,
+                               "integral_time": float(integral_time),
+                               "ideal_gravity": ideal_gravity, "margin": float(margin),
+                               "soft_frequency": float(soft_frequency)}
+    for name, values in (("lower", lower), ("upper", upper)):
+        if values is not None:
+            options[name] = to_numbers(name, values, 1)
+    task = Task(robot._for_gains(urdf_friction), gains, at_tip, options)
+    for doubt in [] if inertia_blocks else Gains(robot._core, gains).doubts(robot._core):
+        warnings.warn(doubt, stacklevel=3)
+    if not outside_limits:
+        check_postures(robot, "lower and upper", [options[k] for k in ("lower", "upper") if k in options])
+    return task
+
+
 def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           task_stiffness: npt.ArrayLike | None = None, task_damping: npt.ArrayLike | None = None,
           damping_factor: float | None = None, null_stiffness: npt.ArrayLike | None = None,
@@ -184,38 +273,15 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     concurrent.futures.BrokenExecutor, which says how many postures were done, if a worker dies and
     its executor does not start the work again.
     """
-    if null_projector not in ("dynamic", "kinematic"):
-        raise Error(f"null_projector: {null_projector!r} is none of dynamic, kinematic")
-    at_tip = joint_stiffness is None and joint_damping is None
-    if not at_tip and not (task_stiffness is None and task_damping is None):
-        raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
-    factor_of = (damping_factor, None) if at_tip else (None, damping_factor)
-    if not float(delay).is_integer():
-        raise Error(f"delay: {delay} is no whole number of ticks; is it in s?")
-    chosen = selected(directions)
-    stiffness = to_gain("task_stiffness", task_stiffness)
-    damping = _damping(task_stiffness, task_damping, factor_of[0], "task_damping")
-    if at_tip and not all(chosen):
-        keep = np.outer(chosen, chosen)
-        stiffness = None if stiffness is None else stiffness * keep
-        damping = None if damping is None else damping * keep
-    gains = gains_text(
-        joint_stiffness=joint_stiffness, task_stiffness=stiffness, task_damping=damping,
-        joint_damping=_damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"),
-        null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
-    options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
-                               "kinematic_null_space": null_projector == "kinematic",
-                               "period": float(period), "delay": delay, "cutoff": float(cutoff),
-                               "difference_velocity": difference_velocity,
-                               "integral_time": float(integral_time),
-                               "ideal_gravity": ideal_gravity, "margin": float(margin),
-                               "soft_frequency": float(soft_frequency)}
-    for name, values in (("lower", lower), ("upper", upper)):
-        if values is not None:
-            options[name] = to_numbers(name, values, 1)
-    task = Task(robot._for_gains(urdf_friction), gains, at_tip, options)
-    for doubt in [] if inertia_blocks else Gains(robot._core, gains).doubts(robot._core):
-        warnings.warn(doubt, stacklevel=2)
+    task = _task(
+        robot, task_stiffness=task_stiffness, task_damping=task_damping,
+        damping_factor=damping_factor, null_stiffness=null_stiffness, null_damping=null_damping,
+        null_projector=null_projector, joint_stiffness=joint_stiffness, joint_damping=joint_damping,
+        frame=frame, directions=directions, half_quaternion=half_quaternion,
+        inertia_blocks=inertia_blocks, period=period, delay=delay, cutoff=cutoff,
+        difference_velocity=difference_velocity, integral_time=integral_time,
+        ideal_gravity=ideal_gravity, margin=margin, soft_frequency=soft_frequency, lower=lower,
+        upper=upper, outside_limits=outside_limits, urdf_friction=urdf_friction)
     if isinstance(postures, Mapping):
         postures = _measured(robot, postures)
     given = None if postures is None else to_numbers("postures", postures, 2)
@@ -223,7 +289,6 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     if q is None and samples == 0 and damping_ratio is None:
         q = robot._core.default_posture()
     if not outside_limits:
-        check_postures(robot, "lower and upper", [options[k] for k in ("lower", "upper") if k in options])
         check_postures(robot, "q", [] if q is None else [to_numbers("q", q, 1)])
         check_postures(robot, "postures", [] if given is None else given)
     posture = workspace = suggestion = None
@@ -238,3 +303,27 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     if samples > 0:
         workspace = _workspace(task, samples, seed, given, executor)
     return Audit(posture, workspace, suggestion)
+
+
+def contact(robot: Robot, q: npt.ArrayLike | None = None, *,
+            direction: npt.ArrayLike | None = None, damper: float = 0, mass: float = 0,
+            stiffness: npt.ArrayLike = (), period: float = 0.001, **stated: Any) -> Contact:
+    """Returns what an arm may touch with its tip at posture q (n, rad; by default the middle of the
+    position limits): a spring with a `damper` (N s/m) and a `mass` (kg) along a `direction` (3, in the
+    base's axes), or along the one that bears least.
+
+    Gains and loop are stated by the keywords of `audit`. For each `stiffness` (N/m) the result has the
+    least damped motion.
+
+    Raises Error like `audit`, for a direction of zero or in which the tip cannot move, and for a
+    damper or mass that is negative.
+    """
+    task = _task(robot, period=period, **stated)
+    at = robot._core.default_posture() if q is None else to_numbers("q", q, 1)
+    if not stated.get("outside_limits", False):
+        check_postures(robot, "q", [at])
+    along = None if direction is None else to_numbers("direction", direction, 1)
+    if along is not None and len(along) != 3:
+        raise Error(f"direction: has {len(along)} entries, expected 3")
+    touched = to_numbers("stiffness", stiffness, 1).tolist()
+    return Contact(**task.core.contact(at, along, float(damper), float(mass), touched))

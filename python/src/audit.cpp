@@ -2,6 +2,7 @@
 
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/controller/audit.hpp>
+#include <dashpot/controller/contact_audit.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/python/src/analysis.hpp>
 #include <dashpot/python/src/robot.hpp>
@@ -168,6 +169,50 @@ nb::dict suggest(const RobotAudit& all, const Eigen::VectorXd& q, double ratio) 
   return result;
 }
 
+nb::dict contact(const RobotAudit& all, const Eigen::VectorXd& q,
+                 const std::optional<Eigen::Vector3d>& direction, double damper, double mass,
+                 const std::vector<double>& stiffness) {
+  const JointVector at = all.robot.joint_vector("q", q);
+  controller::ContactOptions options{direction, damper, mass};
+  controller::ContactAudit found;
+  std::vector<analysis::ContactPoint> curve;
+  {
+    const nb::gil_scoped_release release;
+    found = controller::audit_contact(all.audit, at, options);
+    options.direction = found.touch.direction;
+    curve = controller::contact_curve(all.audit, at, options, stiffness);
+  }
+  const analysis::ContactLimit& limit = found.touch.limit;
+  Eigen::MatrixXd points(static_cast<Eigen::Index>(curve.size()), 3);
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    const analysis::ContactPoint& point = curve[static_cast<std::size_t>(i)];
+    points.row(i) << point.stiffness, point.damping_ratio, point.natural_frequency;
+  }
+  Eigen::MatrixXd forces(static_cast<Eigen::Index>(found.forces.size()), 6);
+  for (Eigen::Index i = 0; i < forces.rows(); ++i) {
+    const controller::HeldForce& one = found.forces[static_cast<std::size_t>(i)];
+    forces.row(i) << one.direction.transpose(), one.force, one.deflection, one.joint;
+  }
+  nb::dict result;
+  result["q"] = to_array(found.q);
+  result["direction"] = to_array(found.touch.direction);
+  result["limit"] = limit.stiffness;
+  result["limit_lower"] = limit.lower;
+  result["limit_upper"] = limit.upper;
+  result["frequency"] = limit.frequency;
+  result["stable_if_rigid"] = limit.stable_if_rigid;
+  result["with_half_stiffness"] = found.with_half_stiffness;
+  result["with_more_damping"] = found.with_more_damping;
+  result["with_less_delay"] = found.with_less_delay;
+  result["passive"] = found.passivity.passive;
+  result["missing_friction"] = found.passivity.missing_friction;
+  result["weight"] = to_array(found.weight);
+  result["effort"] = to_array(found.effort);
+  result["forces"] = to_array(forces);
+  result["curve"] = to_array(points);
+  return result;
+}
+
 /// Postures first .. first + count - 1 of a sequence, or of those given by rows.
 JointVector posture_of(const RobotAudit& all, std::uint64_t seed, const OptionalMatrix& postures,
                        std::int64_t index) {
@@ -276,6 +321,8 @@ void add_audit(nb::module_& m) {
       .def("summarize", &summarize, nb::arg("table"), nb::arg("seed"), nb::arg("postures").none())
       .def("posture", &posture)
       .def("suggest", &suggest)
+      .def("contact", &contact, nb::arg("q"), nb::arg("direction").none(), nb::arg("damper"),
+           nb::arg("mass"), nb::arg("stiffness"))
       .def("judge", &judge, unlocked, nb::arg("question"), nb::arg("seed"), nb::arg("first"),
            nb::arg("count"), nb::arg("postures").none())
       .def("design_region", &design_region, nb::arg("count"), nb::arg("seed"),

@@ -200,3 +200,26 @@ def test_unknown_rotors_are_said_to_be_so_with_what_would_be_enough(root, panda)
     )
     with pytest.raises(dashpot.Error, match="drives: 'pandas' is none of panda, fr3"):
         dashpot.Robot.from_urdf(*model, drives="pandas")
+
+
+def test_contact_turns_where_the_curve_crosses_zero(panda):
+    stated = dict(**GAINS, delay=1, ideal_gravity=True)
+    least = dashpot.contact(panda, HOME, **stated)
+    assert least.limit_lower < least.limit < least.limit_upper and not least.passive
+    assert dashpot.contact(panda, HOME, direction=[0, 0, 1], **stated).limit > least.limit
+    both = dashpot.contact(panda, HOME, direction=3 * least.direction, **stated,
+                           stiffness=[0.99 * least.limit, 1.01 * least.limit])
+    assert both.limit == pytest.approx(least.limit, rel=1e-8)
+    assert both.curve[0, 1] > 0 > both.curve[1, 1]
+    assert both.curve[1, 2] == pytest.approx(both.frequency, rel=0.01)
+    assert least.forces.shape == (8, 6) and (np.abs(least.weight) < least.effort).all()
+
+
+@pytest.mark.parametrize("options, complaint", [
+    (dict(direction=[0, 0, 0]), "direction: has to be finite and not zero"),
+    (dict(direction=[0, 1]), "direction: has 2 entries, expected 3"),
+    (dict(damper=-1), "damper: must be finite and not negative"),
+    (dict(mass=-1), "mass: must be finite and not negative")])
+def test_what_is_no_touch_is_refused(panda, options, complaint):
+    with pytest.raises(dashpot.Error, match=complaint):
+        dashpot.contact(panda, HOME, **GAINS, **options)

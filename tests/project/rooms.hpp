@@ -55,7 +55,7 @@ inline const std::vector<Room>& rooms() {
       {"analysis/spectrum", 3, {"mode", "spectrum", "elastic_form"}, {kEigen}},
       {"analysis/tracker", 4, {"tracked_spectrum", "mode_tracker"}, {kEigen}},
       {"analysis/response", 4, {"response", "sensitivity"}, {kEigen}},
-      {"analysis/sampled", 4, {"sampled_loop"}, {kEigen}},
+      {"analysis/sampled", 4, {"sampled_loop", "contact_limit"}, {kEigen}},
       {"analysis/design",
        5,
        {"damping_target", "damping_design", "damping_region", "damping_sampled", "ratio_damping",
@@ -87,7 +87,7 @@ inline const std::vector<Room>& rooms() {
        {"posture_loop", "rotors", "elastic_joints"},
        {kAnalysis, kText, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
       {"controller/core", 5, {"controller"}, {kAnalysis, kText, kEigen}},
-      {"controller/audit", 5, {"audit", "gain_judge"}, {kAnalysis, kEigen}},
+      {"controller/audit", 5, {"audit", "contact_audit", "gain_judge"}, {kAnalysis, kEigen}},
       {"controller/config", 6, {"config"}, {kText, kEigen}},
       {"controller/plugin",
        7,

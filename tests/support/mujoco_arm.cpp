@@ -55,7 +55,8 @@ void write(const sim::Joint& joint, const sim::ArmOptions& world, std::ostream& 
 }
 
 std::string mjcf(const sim::Robot& robot, const sim::ArmOptions& world,
-                 const MujocoOptions& options) {
+                 const MujocoOptions& options, const Eigen::Vector3d& tip) {
+  constexpr double kFar = 10;  // m, of a tendon's end
   if (!world.loads.empty()) throw sim::InvalidScene("loads", "are not for MuJoCo");
   std::ostringstream out;
   out.precision(17);
@@ -81,8 +82,20 @@ std::string mjcf(const sim::Robot& robot, const sim::ArmOptions& world,
           << "\"/>";
     }
   }
+  const auto& [stiffness, along] = options.tendon;
+  if (stiffness > 0)
+    out << "<site name=\"tip\" pos=\"" << testing::exact(robot.tip().position) << "\"/>";
   for (int i = 0; i < robot.dof(); ++i) out << "</body>";
-  out << "</worldbody></mujoco>";
+  if (stiffness > 0) {
+    out << "<site name=\"far\" pos=\"" << testing::exact(Eigen::Vector3d(tip + kFar * along))
+        << "\"/>";
+  }
+  out << "</worldbody>";
+  if (stiffness > 0) {
+    out << "<tendon><spatial springlength=\"" << kFar << "\" stiffness=\"" << stiffness
+        << "\"><site site=\"tip\"/><site site=\"far\"/></spatial></tendon>";
+  }
+  out << "</mujoco>";
   return out.str();
 }
 
@@ -100,8 +113,9 @@ mjModel* compile(const std::string& xml) {
 
 class Arm final : public MujocoArm {
  public:
-  Arm(const sim::Robot& robot, const sim::ArmOptions& world, const MujocoOptions& options)
-      : model_(compile(mjcf(robot, world, options)), &mj_deleteModel),
+  Arm(const sim::Robot& robot, const sim::ArmOptions& world, const MujocoOptions& options,
+      const Eigen::Vector3d& tip)
+      : model_(compile(mjcf(robot, world, options, tip)), &mj_deleteModel),
         data_(mj_makeData(model_.get()), &mj_deleteData),
         tip_(robot.tip()),
         world_(world),
@@ -219,7 +233,7 @@ bool MujocoArm::available() noexcept {
 std::unique_ptr<MujocoArm> MujocoArm::make(const sim::Robot& robot, const sim::ArmOptions& world,
                                            const MujocoOptions& options, const JointVector& q,
                                            const JointVector& qd) {
-  auto arm = std::make_unique<Arm>(robot, world, options);
+  auto arm = std::make_unique<Arm>(robot, world, options, sim::Arm(robot).tip_pose(q).position);
   arm->place(q, qd.size() > 0 ? qd : JointVector(JointVector::Zero(q.size())));
   return arm;
 }

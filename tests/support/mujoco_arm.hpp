@@ -4,6 +4,7 @@
 #include <dashpot/sim/arm.hpp>
 
 #include <memory>
+#include <utility>
 
 namespace dashpot::testing {
 
@@ -12,6 +13,9 @@ struct MujocoOptions {
   double link_factor = 1;  ///< masses and moments of inertia of the links over the robot's
   sim::Inertia payload;    ///< rigid at the tip, in its axes, beside the robot's
   int delay = 0;           ///< calls of step() from a torque to its effect
+  /// A spring of MuJoCo's own, N/m, along a direction of length 1 in the base's axes, at rest where
+  /// the arm is made: a tendon between the tip and a point ten metres away.
+  std::pair<double, Eigen::Vector3d> tendon{0, Eigen::Vector3d::UnitZ()};
 };
 
 /// A robot with its reflected inertias, friction, payload and gravity, in the world of a sim::Arm:

@@ -1,0 +1,253 @@
+#include <dashpot/analysis/base/require.hpp>
+#include <dashpot/analysis/contact_limit.hpp>
+#include <dashpot/analysis/sampled/circle_count.hpp>
+#include <dashpot/analysis/sampled/margin_search.hpp>
+
+#include <Eigen/Cholesky>
+#include <array>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// The damping ratio of a motion z; negative if it grows.
+double ratio_of(Complex z) {
+  if (z == 0.0) return 1;
+  const Complex lambda = std::log(z);
+  return -lambda.real() / std::max(modulus(lambda), kEps);
+}
+
+/// A loop that touches something, with the stiffness of the touch as the parameter.
+class TouchedLoop {
+ public:
+  TouchedLoop(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
+              const Touch& touch)
+      : period_(loop.period),
+        slowest_(loop.slowest * loop.period),
+        free_(checked(system, touch), spectrum, with_damper(loop, system.dof(), touch)) {
+    const Eigen::LLT<MatrixXd> mass(added(system.mass, touch.mass, touch));
+    a_ = period_ * mass.matrixL().solve(touch.direction);
+    free_.K = free_.P + touch.stiffness_share * (free_.K - free_.P);
+    free_.C = free_.D + touch.damping_share * (free_.C - free_.D);
+  }
+
+  /// Returns the stiffness with which the touch alone makes the arm move at `omega` rad/s.
+  double stiffness_at(double omega) const {
+    return omega * omega * period_ * period_ / a_.squaredNorm();
+  }
+  double period() const { return period_; }
+  /// Whether the state is too large for its eigenvalues.
+  bool counted() const { return free_.rows() > kDenseRows; }
+  SampledDataModel pressed(double stiffness) const {
+    SampledDataModel model = free_;
+    model.press(a_, stiffness);
+    return model;
+  }
+  Trial solve(double stiffness) const { return solve(pressed(stiffness), stiffness); }
+  /// The loop is stable if the excess is negative.
+  Trial at(double stiffness) const {
+    const SampledDataModel model = pressed(stiffness);
+    if (!counted()) return solve(model, stiffness);
+    return {stiffness, CircleCount(model, slowest_).excess(1)};
+  }
+  bool stable_if_rigid() const {
+    SampledDataModel model = free_;
+    model.hold(a_);
+    if (model.n == 0) return true;
+    if (model.rows() > kDenseRows) return CircleCount(model, slowest_).excess(1) < 0;
+    return solve(model, 0).excess < 0;
+  }
+  /// Whether the count of all eigenvalues proves the verdict, with none too near to the circle.
+  bool proves(double stiffness, bool stable) const {
+    constexpr double kClear = 1e-8;  // above what CircleCount takes for a zero on its path
+    const double excess = CircleCount(pressed(stiffness), slowest_).excess(1);
+    return stable ? excess < 0 : excess > kClear;
+  }
+
+ private:
+  static MatrixXd added(const MatrixXd& A, double factor, const Touch& touch) {
+    return A + factor * touch.direction * touch.direction.transpose();
+  }
+  static System<> checked(System<> system, const Touch& touch) {
+    require("contact", touch.direction.size() == system.dof() && touch.direction.allFinite(),
+            "direction has to have n finite entries");
+    require("contact", !touch.direction.isZero(0), "direction must not be zero");
+    for (const auto& [name, value] :
+         {std::pair("damping", touch.damping), {"mass", touch.mass}, {"most", touch.most}}) {
+      require("contact", std::isfinite(value) && value >= 0,
+              std::string(name) + " must be finite and not negative");
+    }
+    system.mass = added(system.mass, touch.mass, touch);
+    system.damping = added(system.damping, touch.damping, touch);
+    return system;
+  }
+  static SampledLoop with_damper(SampledLoop loop, Eigen::Index n, const Touch& touch) {
+    if (touch.damping == 0) return loop;
+    if (loop.friction.size() == 0) loop.friction = MatrixXd::Zero(n, n);
+    loop.friction = added(loop.friction, touch.damping, touch);
+    return loop;
+  }
+  Trial solve(const SampledDataModel& model, double stiffness) const {
+    MatrixXd A = model.on_other_motions(model.transition());
+    return Trial::solve(stiffness, A, slowest_);
+  }
+
+  double period_, slowest_;
+  SampledDataModel free_;
+  VectorXd a_;  ///< a' y T is what the touch is pressed in, y in the coordinates of free_
+};
+
+/// The least damped motion of a trial.
+ContactPoint point_of(const Trial& trial, double period) {
+  ContactPoint point{trial.factor, 1, 0};
+  for (const Complex z : trial.values) {
+    const double ratio = ratio_of(z);
+    if (ratio >= point.damping_ratio || z == 0.0) continue;
+    point.damping_ratio = ratio;
+    point.natural_frequency = modulus(std::log(z)) / period;
+  }
+  return point;
+}
+
+/// Looks for an unstable stiffness where the least ratio has its minimum between trials, by
+/// golden section. Returns the last trial, unstable or not.
+Trial look_between(const TouchedLoop& loop, double low, double high) {
+  constexpr double kGolden = 0.381966;
+  constexpr int kLooks = 5;
+  const auto ratio = [&](const Trial& trial) {
+    return point_of(trial, loop.period()).damping_ratio;
+  };
+  Trial a = loop.at(low * std::pow(high / low, kGolden));
+  Trial b = loop.at(low * std::pow(high / low, 1 - kGolden));
+  for (int i = 0; i < kLooks && a.excess < 0 && b.excess < 0; ++i) {
+    if (ratio(a) < ratio(b)) {
+      high = b.factor;
+      b = a;
+      a = loop.at(low * std::pow(high / low, kGolden));
+    } else {
+      low = a.factor;
+      a = b;
+      b = loop.at(low * std::pow(high / low, 1 - kGolden));
+    }
+  }
+  return a.excess < 0 ? b : a;
+}
+
+/// Returns the boundary between two trials, or another one that finer steps find below it.
+double first_boundary(const TouchedLoop& loop, Trial inside, const Trial& outside) {
+  constexpr int kSteps = 5;
+  const double found = boundary(loop, inside, outside);
+  if (inside.factor == 0) return found;
+  const double ratio = std::pow(found / inside.factor, 1.0 / kSteps);
+  for (int i = 1; i < kSteps; ++i) {
+    const Trial here = loop.at(ratio * inside.factor);
+    if (!(here.excess < 0)) return boundary(loop, inside, here);
+    inside = here;
+  }
+  return found;
+}
+
+/// Returns the next stiffness that is tried: 1.6 times the last one, or less where that takes the
+/// touch further than a turn of `kMostTurn` rad a tick.
+double next_stiffness(const TouchedLoop& loop, double last, double first) {
+  constexpr double kMostTurn = 0.5, kRatio = 1.26;  // of the frequency of the touch
+  if (last < first) return first;
+  const double turn = std::sqrt(last / loop.stiffness_at(1 / loop.period()));
+  const double next = std::min(kRatio * turn, turn + kMostTurn);
+  return last * (next / turn) * (next / turn);
+}
+
+/// Sets the first boundary.
+void find_limit(const TouchedLoop& loop, const Touch& touch, ContactLimit& result) {
+  constexpr double kSlowTouch = 3;     // rad/s, with which the search begins
+  constexpr double kSmallRatio = 0.1;  // below which a minimum between trials may be below zero
+  const double first = loop.stiffness_at(kSlowTouch);
+  std::array<Trial, 2> before{loop.at(0), {-1, 0}};
+  result.stiffness = kInfinity;
+  if (!(before[0].excess < 0)) {
+    result.stiffness = 0;
+    return;
+  }
+  const auto ratio = [&](const Trial& trial) {
+    return point_of(trial, loop.period()).damping_ratio;
+  };
+  while (before[0].factor < touch.most) {
+    Trial here = loop.at(std::min(touch.most, next_stiffness(loop, before[0].factor, first)));
+    if (here.excess < 0 && before[1].factor > 0 && before[0].values.size() > 0) {
+      const double middle = ratio(before[0]);
+      if (middle < kSmallRatio && middle < ratio(before[1]) && middle <= ratio(here)) {
+        Trial found = look_between(loop, before[1].factor, here.factor);
+        if (!(found.excess < 0)) {
+          here = found;
+          if (here.factor < before[0].factor) before[0] = before[1];
+        }
+      }
+    }
+    if (!(here.excess < 0)) {
+      result.stiffness = first_boundary(loop, before[0], here);
+      return;
+    }
+    before = {here, before[0]};
+  }
+}
+
+/// Sets the frequency of the motion that grows beyond a boundary, and interpolates where it begins
+/// to.
+void polish(const TouchedLoop& loop, ContactLimit& result) {
+  constexpr double kAside = 1e-6;
+  constexpr double kSame = 1e-3;  // distance of one eigenvalue on both sides
+  const double k = result.stiffness;
+  Trial beyond = loop.solve((1 + kAside) * k), before = loop.solve((1 - kAside) * k);
+  if (!(beyond.excess > 0 && before.excess < 0)) return;
+  const Complex z = beyond.follow(0);
+  result.frequency = modulus(std::log(z)) / loop.period();
+  if (!(modulus(before.follow(z) - z) < kSame)) return;
+  const double a = beyond.excess, b = before.excess;
+  result.stiffness *= 1 - kAside * (a + b) / (a - b);
+}
+
+/// Sets the nearest stiffnesses on both sides of a boundary at which the verdict is proved.
+void prove(const TouchedLoop& loop, ContactLimit& result) {
+  constexpr double kNearest = 1e-6, kFurthest = 0.02;
+  for (const bool stable : {true, false}) {
+    for (double off = kNearest; off < kFurthest; off *= 10) {
+      const double there = result.stiffness * (stable ? 1 - off : 1 + off);
+      if (!loop.proves(there, stable)) continue;
+      (stable ? result.lower : result.upper) = there;
+      break;
+    }
+  }
+}
+
+}  // namespace
+
+ContactLimit contact_limit(const System<>& system, const Spectrum<>& spectrum,
+                           const SampledLoop& given, const Touch& touch, bool proved) {
+  const TouchedLoop loop(system, spectrum, given, touch);
+  ContactLimit result;
+  find_limit(loop, touch, result);
+  result.stable_if_rigid = loop.stable_if_rigid();
+  if (!(result.stiffness > 0) || std::isinf(result.stiffness)) {
+    result.lower = result.upper = result.stiffness;
+    return result;
+  }
+  if (proved || !loop.counted()) polish(loop, result);
+  if (proved) prove(loop, result);
+  return result;
+}
+
+std::vector<ContactPoint> contact_curve(const System<>& system, const Spectrum<>& spectrum,
+                                        const SampledLoop& given, const Touch& touch,
+                                        const std::vector<double>& stiffness) {
+  const TouchedLoop loop(system, spectrum, given, touch);
+  std::vector<ContactPoint> points;
+  for (const double k : stiffness) {
+    require("contact", std::isfinite(k) && k >= 0, "stiffness must be finite and not negative");
+    points.push_back(point_of(loop.solve(k), loop.period()));
+  }
+  return points;
+}
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,39 @@
+#pragma once
+#include <dashpot/apps/audit/audit_options.hpp>
+#include <dashpot/controller/contact_audit.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// A limit at one of many postures.
+struct PostureContact {
+  bool held = false;  ///< the arm can hold itself there
+  /// NaN as the stiffness: it cannot, or the tip cannot move in the direction, or the eigenvalue
+  /// iteration fails.
+  controller::ContactAt touch;
+};
+
+/// What `dashpot contact` found.
+struct ContactReport {
+  controller::ContactOptions options;
+  double asked = 0;  ///< stiffness that the arm is to touch, N/m; 0: none
+  controller::ContactAudit posture;
+  std::vector<analysis::ContactPoint> curve;
+  double limit_with_rotors = 0;  ///< N/m, with published rotors where the model has none; or NaN
+  std::vector<PostureContact> workspace;          ///< empty if it was not asked for
+  std::vector<controller::JointVector> postures;  ///< of the workspace
+  bool interrupted = false;
+};
+
+std::string contact_json(const AuditTask& task, const ContactReport& report);
+/// Returns tables that begin with the verdict in one line.
+std::string contact_table(const AuditTask& task, const ContactReport& report);
+
+/// Draws ratio and frequency over the stiffness to a file whose name ends with .svg or .png. Throws
+/// std::runtime_error if gnuplot does not do it.
+void draw_contact(const std::string& path, const AuditTask& task, const ContactReport& report);
+
+}  // namespace dashpot::apps

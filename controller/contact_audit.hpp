@@ -1,0 +1,65 @@
+#pragma once
+#include <dashpot/analysis/contact_limit.hpp>
+#include <dashpot/controller/audit.hpp>
+
+#include <array>
+#include <optional>
+#include <vector>
+
+namespace dashpot::controller {
+
+/// What an arm touches with its tip: a spring of any stiffness, with a damper and a mass, along one
+/// direction.
+struct ContactOptions {
+  /// In the base's axes, of any length but zero; none: the direction that bears least.
+  std::optional<Eigen::Vector3d> direction;
+  double damping = 0;  ///< b, N s/m
+  double mass = 0;     ///< m, kg
+  double most = 1e9;   ///< stiffness up to which a limit is looked for, N/m
+};
+
+/// What a loop bears at a posture: the limit in a direction.
+struct ContactAt {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of length 1, in the base's axes
+  analysis::ContactLimit limit;
+};
+
+/// What the joints can give in a direction beside the weight of the arm.
+struct HeldForce {
+  Eigen::Vector3d direction;  ///< in which the tip presses, of length 1, in the base's axes
+  double force = 0;           ///< until a joint is at its effort limit, N; infinite: none is
+  int joint = -1;             ///< which is, from 0; -1: none
+  /// How far the springs are pressed in with that force, m, beyond which they are springs no more;
+  /// infinite where no spring acts.
+  double deflection = 0;
+};
+
+/// A posture in full.
+struct ContactAudit {
+  JointVector q;  ///< n, rad (m)
+  ContactAt touch;
+  /// The limit in that direction, N/m, with half of the stiffness, with 1.5 times the damping, and
+  /// with a tick less of delay; NaN where there is no delay.
+  double with_half_stiffness = 0, with_more_damping = 0, with_less_delay = 0;
+  analysis::PortPassivity passivity;
+  JointVector weight, effort;  ///< torque against gravity and its limit, n, N m; limit 0: not known
+  std::vector<HeldForce> forces;  ///< along the touch, against it, and along all axes of the base
+};
+
+/// Returns the limit at q (n, rad) without proved bounds; where no direction is asked for, the
+/// least of 13 directions spread over the half sphere. Throws like Audit::numbers, and
+/// std::invalid_argument without a period, for what ContactOptions does not allow, and for a
+/// direction in which the tip cannot move.
+ContactAt find_contact(const Audit& audit, const JointVector& q, const ContactOptions& options);
+
+/// Returns what the arm bears and holds at q, with a proved bracket of the limit. The direction
+/// that bears least is then refined to 0.01 rad. Throws likewise.
+ContactAudit audit_contact(const Audit& audit, const JointVector& q, const ContactOptions& options);
+
+/// Returns the least damped motion at q for each stiffness (N/m) of a touch in options.direction.
+/// Throws likewise, and without a direction.
+std::vector<analysis::ContactPoint> contact_curve(const Audit& audit, const JointVector& q,
+                                                  const ContactOptions& options,
+                                                  const std::vector<double>& stiffness);
+
+}  // namespace dashpot::controller
