@@ -12,7 +12,7 @@ using Eigen::VectorXd;
 
 constexpr double kClearlyLess = 10;   // of a sum of squares: a link in place of the payload
 constexpr double kClearlyMore = 16;   // the payload, which has four numbers, in place of a link
-constexpr double kClearPayload = 16;  // likewise, in place of nothing
+constexpr double kClearPayload = 20;  // likewise, in place of nothing
 constexpr Index kBody = 10;
 
 /// Sums of squares of fits with some of many columns.
