@@ -1,5 +1,4 @@
 // Random walks through the systems of 1 to 16 coordinates: every bound encloses the truth.
-#include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/tracked.hpp>
 
 #include <gtest/gtest.h>
@@ -9,56 +8,6 @@
 
 namespace dashpot::analysis {
 namespace {
-
-using Eigen::MatrixXd;
-using testing::Random;
-
-/// A system that wanders: factors of mass, damping and stiffness drift smoothly at random.
-class Walk {
- public:
-  /// `rows` of the stiffness factor; 0 for a full stiffness without one.
-  Walk(Random& random, int n, int rows, double damping, double step)
-      : random_(random), n_(n), rows_(rows), damping_size_(damping), step_(step) {
-    mass_ = start(n, n);
-    damping_ = start(n, n);
-    stiffness_ = start(rows > 0 ? rows : n, n);
-  }
-
-  System<kMaxDof> next() {
-    for (Part* part : {&mass_, &damping_, &stiffness_}) {
-      part->velocity = 0.95 * part->velocity +
-                       0.05 * step_ * random_.matrix(part->value.rows(), part->value.cols());
-      part->value += part->velocity - 1e-3 * step_ * part->value;
-    }
-    System<kMaxDof> system(n_);
-    system.mass = gram(mass_.value, 0.3);
-    system.damping = damping_size_ * gram(damping_.value, 0.02);
-    if (rows_ > 0) {
-      system.stiffness_factor = 20 * stiffness_.value;
-    } else {
-      system.stiffness = 400 * gram(stiffness_.value, 0.1);
-    }
-    return system;
-  }
-
- private:
-  struct Part {
-    MatrixXd value, velocity;
-  };
-  Part start(int rows, int cols) {
-    return {random_.matrix(rows, cols) / std::sqrt(static_cast<double>(cols)),
-            MatrixXd::Zero(rows, cols)};
-  }
-  static MatrixXd gram(const MatrixXd& F, double floor) {
-    const MatrixXd product = F.transpose() * F;
-    return 0.5 * (product + product.transpose()) + floor * MatrixXd::Identity(F.cols(), F.cols());
-  }
-
-  Random& random_;
-  int n_, rows_;
-  double damping_size_, step_;
-  Part mass_, damping_, stiffness_;
-};
 
 struct Size {
   int joints, rows;
@@ -81,13 +30,11 @@ INSTANTIATE_TEST_SUITE_P(Sizes, RandomWalk,
 
 TEST_P(RandomWalk, IsFollowedWithinItsBounds) {
   const auto [n, rows] = GetParam();
-  Random random(2000 + 100U * static_cast<unsigned>(n) + static_cast<unsigned>(rows));
+  testing::Dice dice(2000 + 100U * static_cast<unsigned>(n) + static_cast<unsigned>(rows));
   testing::Follower follower;
   const int steps = n <= 7 ? 500 : 200, apart = n <= 7 ? 10 : 25;
-  for (const double damping : {0.02, 1.0, 12.0}) {
-    SCOPED_TRACE("damping " + std::to_string(damping));
-    Walk walk(random, n, rows, damping, 0.02);
-    follower.follow([&](double) { return walk.next(); }, steps, 1, apart);
+  for (int walk = 0; walk < 3; ++walk) {
+    follower.follow(testing::wandering_of(n, rows, dice), steps, 1e-3 * steps, apart);
     ASSERT_EQ(follower.spectrum->mode_count, rows > 0 ? rows : n);
   }
   // Followed, not solved directly; and the bounds are worth something.

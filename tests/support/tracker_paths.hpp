@@ -187,10 +187,9 @@ inline SystemPath turning_coinciding(Dice& dice) {
   };
 }
 
-/// Coefficients that turn and swing at random, not proportionally damped; `Factored` comes with a
-/// factor of fewer rows than joints at times.
-inline SystemPath wandering(Dice& dice) {
-  const int n = dice.integer(1, 9), rows = dice.integer(0, n);
+/// Coefficients that turn and swing at random, not proportionally damped; with a stiffness factor
+/// of so many rows, if any.
+inline SystemPath wandering_of(int n, int rows, Dice& dice) {
   const bool factored = rows > 0;
   std::array<Eigen::MatrixXd, 6> part;
   for (Eigen::MatrixXd& matrix : part) matrix = dice.matrix(n, n) / std::sqrt(n);
@@ -206,6 +205,11 @@ inline SystemPath wandering(Dice& dice) {
     if (factored) system.stiffness_factor = 20 * F(4).topRows(rows);
     return system;
   };
+}
+
+inline SystemPath wandering(Dice& dice) {
+  const int n = dice.integer(1, 9), rows = dice.integer(0, n);
+  return wandering_of(n, rows, dice);
 }
 
 /// One system, and changes about the last digits, or above.
