@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/analysis/spectrum/spectrum_result.hpp>
 
+#include <optional>
 #include <vector>
 
 namespace dashpot::analysis {
@@ -12,6 +13,14 @@ struct Motion {
   Eigen::VectorXd velocity;            ///< n
   Eigen::VectorXd zero_mode_position;  ///< n
   Eigen::VectorXd zero_mode_velocity;  ///< n
+};
+
+/// What sets a system in motion, n entries each; what is not given is zero.
+struct Cause {
+  std::optional<Eigen::VectorXd> position;  ///< q(0)
+  std::optional<Eigen::VectorXd> velocity;  ///< q'(0)
+  std::optional<Eigen::VectorXd> impulse;   ///< generalized, at t = 0, N s or N m s
+  std::optional<Eigen::VectorXd> force;     ///< generalized, constant from t = 0 on, N or N m
 };
 
 /// Computes closed-form responses of a linear system from its modal basis. Any time costs the same
@@ -37,6 +46,8 @@ class Response {
   Motion impulse(const Eigen::VectorXd& impulse, double time) const;
   /// Returns the response from rest to a generalized force that is constant from t = 0 on.
   Motion step(const Eigen::VectorXd& force, double time) const;
+  /// Returns the sum of the responses to all that the cause names.
+  Motion caused(const Cause& cause, double time) const;
   /// Returns the response from rest to  cosine cos(omega t) + sine sin(omega t)  from t = 0 on,
   /// omega in rad/s. It is exact at resonance too.
   Motion harmonic(const Eigen::VectorXd& cosine, const Eigen::VectorXd& sine, double omega,
@@ -67,5 +78,29 @@ class Response {
   Eigen::MatrixXd velocity_basis_;  // U Lambda
   Eigen::MatrixXd zero_projector_;  // U0 U0' M
 };
+
+/// How a motion is made up of the m modes of a spectrum, in their order.
+///
+/// The motion is the sum of q_i(t) = U_i exp(Lambda_i t) xi_i, mode i's own free motion, and of the
+/// drift along the zero modes. After a step it is the motion about the new rest. With
+///     E_i = (q_i' K q_i + v_i' M v_i) / 2 at t = 0,    v_i the velocity of q_i,
+/// the share of mode i is E_i / (sum of all E). Shares add up to one. They do not contain the cross
+/// terms q_i' K q_k + v_i' M v_k, which vanish where the undamped modes decouple the damping.
+struct ModeShares {
+  Eigen::VectorXd energy;  ///< m; NaN if nothing moves. Within [0, 1] unless K is indefinite
+  double zero_modes = 0;   ///< share of the drift along zero modes, without that of a step
+  /// (energy of the whole motion - sum of all E) / (sum of all E)
+  double cross = 0;
+  /// Largest |p_k| of each point's coordinate k and mode in t >= 0, in the motion p = J q_i(t) of
+  /// that mode alone; rows of J x m. Infinite for an unstable mode that moves it.
+  Eigen::MatrixXd amplitude;
+};
+
+/// Returns how the motion that a cause sets off is made up. `points` is J (p x n), the Jacobian of
+/// the coordinates of which the amplitude is wanted; the identity for q itself. Modes that no
+/// well-conditioned basis separates share their motion evenly. Throws std::invalid_argument as
+/// Response does, and if J has not n columns.
+ModeShares mode_shares(const System<>& system, const Spectrum<>& spectrum, const Cause& cause,
+                       const Eigen::MatrixXd& points);
 
 }  // namespace dashpot::analysis

@@ -103,6 +103,23 @@ Motion Response::step(const VectorXd& force, double time) const {
   return motion(time * (phi_of_basis(1, time) * drive_of(force, "force")));
 }
 
+Motion Response::caused(const Cause& cause, double time) const {
+  const VectorXd zero = VectorXd::Zero(mass_.rows());
+  Motion sum{zero, zero, zero, zero};
+  const auto add = [&](const Motion& part) {
+    sum.position += part.position;
+    sum.velocity += part.velocity;
+    sum.zero_mode_position += part.zero_mode_position;
+    sum.zero_mode_velocity += part.zero_mode_velocity;
+  };
+  if (cause.position || cause.velocity) {
+    add(free(cause.position.value_or(zero), cause.velocity.value_or(zero), time));
+  }
+  if (cause.impulse) add(impulse(*cause.impulse, time));
+  if (cause.force) add(step(*cause.force, time));
+  return sum;
+}
+
 Motion Response::harmonic(const VectorXd& cosine, const VectorXd& sine, double omega,
                           double time) const {
   require_forced_time(time);

@@ -1,3 +1,4 @@
+#include <dashpot/apps/report/mode_shares.hpp>
 #include <dashpot/apps/report/system_report.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/text/printable.hpp>
@@ -10,30 +11,22 @@
 namespace dashpot::apps {
 namespace {
 
-void add(analysis::Motion& sum, const analysis::Motion& part) {
-  sum.position += part.position;
-  sum.velocity += part.velocity;
-  sum.zero_mode_position += part.zero_mode_position;
-  sum.zero_mode_velocity += part.zero_mode_velocity;
-}
-
 ReportedResponse respond(const SystemEntry& entry, const analysis::System<>& system,
                          const analysis::Spectrum<>& spectrum) {
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(system.dof());
   const analysis::Response response(system, spectrum);
+  const analysis::Cause cause{entry.initial_position, entry.initial_velocity, entry.impulse,
+                              entry.force};
   ReportedResponse result;
   for (const double time : *entry.times) {
-    analysis::Motion motion{
-        .position = zero, .velocity = zero, .zero_mode_position = zero, .zero_mode_velocity = zero};
-    if (entry.initial_position || entry.initial_velocity) {
-      add(motion, response.free(entry.initial_position.value_or(zero),
-                                entry.initial_velocity.value_or(zero), time));
-    }
-    if (entry.impulse) add(motion, response.impulse(*entry.impulse, time));
-    if (entry.force) add(motion, response.step(*entry.force, time));
     result.times.push_back(time);
-    result.motions.push_back(std::move(motion));
+    result.motions.push_back(response.caused(cause, time));
   }
+  const Eigen::Index n = system.dof();
+  const bool task = entry.impedance.jacobian && entry.impedance.jacobian->rows() > 0;
+  result.point = task ? "the directions of jacobian" : "the coordinates";
+  result.shares = analysis::mode_shares(
+      system, spectrum, cause,
+      task ? *entry.impedance.jacobian : Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
   return result;
 }
 
@@ -68,7 +61,8 @@ std::vector<std::string> notes_on(const SystemEntry& entry, const analysis::Syst
 }
 
 Json response_json(const ReportedResponse& response) {
-  Json result = {{"times", response.times},
+  Json result = {{"shares", shares_json(response.shares)},
+                 {"times", response.times},
                  {"position", Json::array()},
                  {"velocity", Json::array()},
                  {"zero_mode_position", Json::array()}};
@@ -182,6 +176,9 @@ class Writer {
   }
 
   void write_response(const ReportedResponse& response, const Report& report) {
+    blank_line();
+    heading("Shares of the modes");
+    out_ += shares_table(report.spectrum, response.shares, response.point);
     write_motion("Position", response, &analysis::Motion::position, report.dof);
     write_motion("Velocity", response, &analysis::Motion::velocity, report.dof);
     if (report.spectrum.zero_modes.count > 0) {

@@ -15,6 +15,8 @@ namespace dashpot::apps {
 struct ReportedResponse {
   std::vector<double> times;              ///< s
   std::vector<analysis::Motion> motions;  ///< one for each time
+  analysis::ModeShares shares;            ///< of the modes in it
+  std::string point;                      ///< whose amplitudes these are
 };
 
 /// What `dashpot analyze` says of one system.

@@ -214,6 +214,7 @@ void run(const Options& options) {
   }
   report.period = scene.plant.period;
   report.simulated_time = loop.plant().time();
+  report.release = predict_release(scene);
   report.energy = loop.plant().audit();
   report.extremes = loop.extremes();
   report.contact_force = loop.contact_force();

@@ -1,6 +1,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/mode_shares.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/run/run_report.hpp>
@@ -267,6 +268,10 @@ std::string to_table(const RunReport& report) {
     out += modes_text("start", loop.first_modes, 0) +
            modes_text("end", loop.last_modes, report.simulated_time);
   }
+  if (report.release) {
+    out += "\nRelease at the start: shares of the modes\n" +
+           shares_table(report.release->spectrum, report.release->shares, report.release->point);
+  }
   if (report.ring_down) {
     out += "\nRing-down after " + count(report.ring_down->releases, "small release") +
            " (sampled: predicted with the drives of the scene)\n" +
@@ -332,6 +337,10 @@ std::string to_json(const RunReport& report) {
       {"faults", loop.faults},
       {"fault", fault_json(loop)}};
   if (report.identified) result["identified"] = identify_json(*report.identified);
+  if (report.release) {
+    result["release"] = {{"modes", modes_json(report.release->spectrum)},
+                         {"shares", shares_json(report.release->shares)}};
+  }
   if (report.ring_down) result["ring_down"] = ring_down_json(*report.ring_down);
   return json_text(result);
 }

@@ -2,6 +2,7 @@
 #include <dashpot/apps/identify/identify_writer.hpp>
 #include <dashpot/apps/loop/command_report.hpp>
 #include <dashpot/apps/loop/loop_thread.hpp>
+#include <dashpot/apps/run/predicted_release.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
 
 #include <optional>
@@ -31,6 +32,7 @@ struct RunReport {
   lcmtypes::PublisherCounters messages;
   std::optional<CommandReport> commands;     ///< if any were to be taken
   std::optional<IdentifyReport> identified;  ///< what followed an excitation
+  std::optional<PredictedRelease> release;   ///< if the scene begins with one
   std::optional<RingDown> ring_down;
 };
 

@@ -40,8 +40,8 @@ def modes(M: npt.ArrayLike, C: npt.ArrayLike | None = None, K: npt.ArrayLike | N
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Response(Result):
-    """Motion of a system at t times: position and velocity of its n coordinates, and the parts of
-    them along the zero modes."""
+    """Motion of a system at t times: position and velocity of its n coordinates, the parts of
+    them along the zero modes, and what each of its m modes has in it."""
 
     times: Array
     """t, s."""
@@ -53,23 +53,32 @@ class Response(Result):
     """t x n."""
     zero_mode_velocity: Array
     """t x n."""
+    energy_share: Array
+    """m: energy of each mode's own free motion at t = 0, relative to the sum of all."""
+    zero_mode_share: float
+    """The same of the drift along the zero modes. All shares add up to one."""
+    cross_share: float
+    """What the whole motion has beyond that sum, relative to it: energy that modes share."""
+    amplitude: Array
+    """m x p: how far each mode alone takes each of the points; infinite if it grows."""
 
 
 def response(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
              times: npt.ArrayLike, *, initial_position: npt.ArrayLike | None = None,
              initial_velocity: npt.ArrayLike | None = None, impulse: npt.ArrayLike | None = None,
-             force: npt.ArrayLike | None = None) -> Response:
+             force: npt.ArrayLike | None = None, points: npt.ArrayLike | None = None) -> Response:
     """Returns the motion of M q'' + C q' + K q = f, in closed form.
 
     It starts at t = 0 from `initial_position` and `initial_velocity` (n each, zero by default), and
-    feels `impulse` (n, N s or N m s) at t = 0 and `force` (n, N or N m) from t = 0 on. Raises Error
-    as `modes` does, and for other sizes and times below zero.
+    feels `impulse` (n, N s or N m s) at t = 0 and `force` (n, N or N m) from t = 0 on. Amplitudes
+    are those of the points J q with J = `points` (p x n, such as three rows of Robot.jacobian), or
+    of q. Raises Error as `modes` does, and for other sizes and times below zero.
     """
     return Response(**_core.response(
         _impedance(M, C, K, None, None, None), to_numbers("times", times, 1),
         to_vector("initial_position", initial_position),
         to_vector("initial_velocity", initial_velocity), to_vector("impulse", impulse),
-        to_vector("force", force)))
+        to_vector("force", force), to_matrix("points", points)))
 
 
 def receptance(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,

@@ -101,46 +101,28 @@ nb::dict find_modes(const TaskImpedance& impedance, double soft_frequency) {
   return modes_of(solved->spectrum);
 }
 
-/// The sum of the motions that the causes given make at one time.
-struct Causes {
-  OptionalVector position, velocity, impulse, force;
-
-  Motion motion(const analysis::Response& response, Eigen::Index n, double time) const {
-    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n);
-    Motion sum = response.free(position.value_or(zero), velocity.value_or(zero), time);
-    if (impulse) add(sum, response.impulse(*impulse, time));
-    if (force) add(sum, response.step(*force, time));
-    return sum;
-  }
-
- private:
-  static void add(Motion& sum, const Motion& part) {
-    sum.position += part.position;
-    sum.velocity += part.velocity;
-    sum.zero_mode_position += part.zero_mode_position;
-    sum.zero_mode_velocity += part.zero_mode_velocity;
-  }
-};
-
 nb::dict respond(const TaskImpedance& impedance, const Eigen::VectorXd& times,
                  OptionalVector position, OptionalVector velocity, OptionalVector impulse,
-                 OptionalVector force) {
-  const Causes causes{std::move(position), std::move(velocity), std::move(impulse),
-                      std::move(force)};
+                 OptionalVector force, const OptionalMatrix& points) {
+  const analysis::Cause cause{std::move(position), std::move(velocity), std::move(impulse),
+                              std::move(force)};
   const Eigen::Index n = impedance.mass.rows();
   Eigen::MatrixXd q(times.size(), n), qd(times.size(), n), zero(times.size(), n),
       zero_rate(times.size(), n);
+  analysis::ModeShares shares;
   {
     const nb::gil_scoped_release release;
     const Solved solved(impedance, analysis::SpectrumOptions().soft_frequency);
     const analysis::Response response(solved.system, solved.spectrum);
     for (Eigen::Index i = 0; i < times.size(); ++i) {
-      const Motion motion = causes.motion(response, n, times[i]);
+      const Motion motion = response.caused(cause, times[i]);
       q.row(i) = motion.position;
       qd.row(i) = motion.velocity;
       zero.row(i) = motion.zero_mode_position;
       zero_rate.row(i) = motion.zero_mode_velocity;
     }
+    shares = analysis::mode_shares(solved.system, solved.spectrum, cause,
+                                   points.value_or(Eigen::MatrixXd::Identity(n, n)));
   }
   nb::dict result;
   result["times"] = to_array(times);
@@ -148,6 +130,10 @@ nb::dict respond(const TaskImpedance& impedance, const Eigen::VectorXd& times,
   result["velocity"] = to_array(qd);
   result["zero_mode_position"] = to_array(zero);
   result["zero_mode_velocity"] = to_array(zero_rate);
+  result["energy_share"] = to_array(shares.energy);
+  result["zero_mode_share"] = shares.zero_modes;
+  result["cross_share"] = shares.cross;
+  result["amplitude"] = to_array(shares.amplitude.transpose());
   return result;
 }
 
@@ -239,7 +225,8 @@ void add_analysis(nb::module_& m) {
            nb::arg("gravity_gradient").none(), nb::arg("integral").none());
   m.def("modes", &find_modes, nb::arg("impedance"), nb::arg("soft_frequency"));
   m.def("response", &respond, nb::arg("impedance"), nb::arg("times"), nb::arg("position").none(),
-        nb::arg("velocity").none(), nb::arg("impulse").none(), nb::arg("force").none());
+        nb::arg("velocity").none(), nb::arg("impulse").none(), nb::arg("force").none(),
+        nb::arg("points").none());
   m.def("receptance", &receptance, nb::arg("impedance"), nb::arg("omega"));
   m.def("sensitivities", &find_sensitivities, nb::arg("impedance"));
   m.def("sampled_modes", &find_sampled_modes, nb::arg("impedance"), nb::arg("loop"));

@@ -169,6 +169,21 @@ def test_responses_are_those_of_the_matrix_exponential():
         dashpot.response(M, C, K, times, force=[1, 2])
 
 
+def test_shares_are_those_of_undamped_modes_where_damping_is_proportional():
+    M, _, K = random_system(5)
+    q, qd = np.random.default_rng(9).standard_normal((2, 5))
+    squares, V = scipy.linalg.eigh(K, M)
+    energy = (squares * (V.T @ M @ q)**2 + (V.T @ M @ qd)**2)[::-1]
+    found = dashpot.response(M, 0.01 * M, K, [], initial_position=q, initial_velocity=qd)
+    np.testing.assert_allclose(found.energy_share, energy / energy.sum(), atol=1e-10)
+    assert abs(found.cross_share) < 1e-10 and found.zero_mode_share == 0
+    row = np.ones((1, 5))
+    at = dashpot.response(M, 0 * M, K, [], initial_position=q, points=row).amplitude
+    np.testing.assert_allclose(at[:, 0], abs(row @ V * (V.T @ M @ q))[0, ::-1], atol=1e-10)
+    with pytest.raises(dashpot.Error):
+        dashpot.response(M, None, K, [], initial_position=q, points=np.ones((1, 4)))
+
+
 def test_sensitivities_are_finite_differences():
     M, C, K = random_system(7)
     found = dashpot.sensitivities(M, C, K)

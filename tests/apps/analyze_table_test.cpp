@@ -47,6 +47,22 @@ TEST(AnalyzeTable, ShowsTheModesOfThePaper) {
   }
 }
 
+TEST(AnalyzeTable, TellsTheSharesOfTheModesInAMotion) {
+  const std::string release =
+      "{mass: [[1, 0], [0, 1]], stiffness: [[2, -1], [-1, 2]], initial_position: [1, 0], "
+      "times: [0]";
+  const std::string text = table_of(analyze_text(release + "}"));
+  EXPECT_THAT(text, ContainsRegex("\n +1 +1\\.7321 +0 +75\\.0 +0\\.500, 0\\.500\n"));
+  EXPECT_THAT(text, ContainsRegex("\n +2 +1\\.0000 +0 +25\\.0 +0\\.500, 0\\.500\n"));
+  // Of the task p = q1 + q2 the first mode, in which they move against each other, takes no part.
+  const Json result =
+      analyze_json(release + ", jacobian: [[1, 1]], task_stiffness: [[0]]}")["response"]["shares"];
+  EXPECT_NEAR(result["energy"][0].get<double>(), 0.75, 1e-12);
+  EXPECT_NEAR(result["amplitude"][0][0].get<double>(), 0, 1e-12);
+  EXPECT_NEAR(result["amplitude"][1][0].get<double>(), 1, 1e-12);
+  EXPECT_NEAR(result["cross"].get<double>(), 0, 1e-12);
+}
+
 TEST(AnalyzeTable, SaysWhatIsSpecialAboutASystem) {
   const std::string general =
       table_of(analyze_text("{mass: [[1]], damping: [[1]], stiffness: [[1]], jacobian: [[1]], "

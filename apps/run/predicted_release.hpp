@@ -1,0 +1,23 @@
+#pragma once
+#include <dashpot/analysis/response.hpp>
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/apps/scene/scene.hpp>
+
+#include <optional>
+#include <string>
+
+namespace dashpot::apps {
+
+/// What the modes have in the motion with which a scene begins.
+struct PredictedRelease {
+  analysis::Spectrum<> spectrum;
+  analysis::ModeShares shares;
+  std::string point;  ///< whose amplitudes these are
+};
+
+/// Returns it for a scene whose robot is let go away from its rest, linear about the rest.
+/// Amplitudes are those of the tip's x, y and z, or of the coordinates of matrices. Nothing if it
+/// starts at rest, has elastic gears, or has no modes.
+std::optional<PredictedRelease> predict_release(const Scene& scene);
+
+}  // namespace dashpot::apps
