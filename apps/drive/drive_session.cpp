@@ -22,6 +22,7 @@ constexpr double kPeriodTolerance = 0.2;  // of the period
 constexpr double kOldest = 2;             // periods that a status may be old when it is answered
 constexpr std::int64_t kSameClock = 1'000'000;  // us between the driver's clock and the time of day
 constexpr std::int64_t kDrift = 1000;    // of a clock's time, by which the other one may differ
+constexpr double kUpright = 0.9998;      // cosine of the largest angle of an upright base, 1 deg
 constexpr double kNearLimit = 0.8;       // of an external torque with which the driver stops
 constexpr std::size_t kRemembered = 64;  // commands sent
 constexpr double kFade = 0.2;            // s from a stop to no torque, at least
@@ -36,11 +37,18 @@ bool finite(const DriverStatus& status) {
 }
 
 /// Throws unless the controller knows the loop that this driver closes.
-void check_loop(const controller::Settings& settings, DriverKind driver) {
+void check_loop(const controller::Config& config, DriverKind driver) {
+  const controller::Settings& settings = config.settings;
   const controller::Analysis::Sampled& loop = settings.analysis.sampled;
   if (settings.feed_forward.gravity) {
     throw InputError("feed_forward.gravity",
                      "must be false: the driver compensates gravity, which would act twice");
+  }
+  const Eigen::Vector3d& gravity = config.model.gravity();
+  if (gravity.z() > -kUpright * gravity.norm()) {
+    throw InputError("robot.gravity",
+                     "is not along -z of the base: the robot compensates gravity for an upright "
+                     "base, so that an arm on a wall or a ceiling would pull by the difference");
   }
   if (loop.delay < 1) {
     throw InputError("analysis.sampled.delay",
@@ -71,7 +79,7 @@ DriveSession::DriveSession(const controller::Config& config, LoopController& con
       options_(options),
       profile_(lcmtypes::profile_of(options.driver)),
       n_(config.model.dof()) {
-  check_loop(config.settings, options.driver);
+  check_loop(config, options.driver);
   torque_ = record.external = JointVector::Zero(n_);
   const controller::Limits& limits = config.settings.limits;
   const double slowest = limits.torque.cwiseQuotient(limits.torque_rate).maxCoeff();

@@ -21,6 +21,7 @@ from ._controller import Controller
 from ._core import Error
 
 TORQUE_RATE = 1000.0  # N m/s that the robot bears
+UPRIGHT = 0.9998  # cosine of the largest angle of an upright base, 1 degree
 TORQUE = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # N m, likewise
 LONGEST = 10_000  # us; answers that took longer count as this
 
@@ -73,6 +74,10 @@ def check_loop(controller: Controller) -> dict[str, Any]:
     if loop["gravity"]:
         raise Error("feed_forward.gravity: must be false: the robot compensates gravity, which would "
                     "act twice")
+    if loop["base_gravity"][2] > -UPRIGHT * np.linalg.norm(loop["base_gravity"]):
+        raise Error("robot.gravity: is not along -z of the base: the robot compensates gravity for "
+                    "an upright base, so that an arm on a wall or a ceiling would pull by the "
+                    "difference")
     if loop["delay"] < 1:
         raise Error("analysis.sampled.delay: must be at least 1: a torque acts a period after its "
                     "state at the soonest")

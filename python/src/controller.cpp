@@ -327,6 +327,7 @@ nb::dict loop_of(const Host& host) {
   const controller::Analysis::Sampled& sampled = settings.analysis.sampled;
   nb::dict loop;
   loop["gravity"] = settings.feed_forward.gravity;
+  loop["base_gravity"] = Eigen::VectorXd(host.get()->model.gravity());
   loop["delay"] = sampled.delay;
   loop["cutoff"] = sampled.cutoff;
   loop["difference_velocity"] = sampled.difference_velocity;

@@ -130,6 +130,8 @@ def run(monkeypatch):
 
 @pytest.mark.parametrize("section, keys, reason", [
     ("feed_forward", {"gravity": True}, "feed_forward.gravity"),
+    ("robot", {"gravity": [0, 0, 9.81]}, "robot.gravity: is not along -z of the base"),
+    ("robot", {"gravity": [0.6, 0, -9.79]}, "robot.gravity"),
     ("analysis", {"sampled": {"interval": 0.1}}, "analysis.sampled.delay"),
     ("analysis", {"sampled": {"delay": 1, "cutoff": 100.0}}, "analysis.sampled.cutoff"),
     ("control", {"period": 0.002}, "control.period"),

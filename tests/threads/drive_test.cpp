@@ -216,6 +216,8 @@ TEST_P(Drive, RefusesALoopThatIsNotTheDrivers) {
   };
   EXPECT_THAT(refusal("gravity: false", "gravity: true"),
               HasSubstr("feed_forward.gravity: must be false"));
+  EXPECT_THAT(refusal("robot:\n", "robot:\n  gravity: [0, 0, 9.81]\n"),
+              HasSubstr("robot.gravity: is not along -z of the base"));
   EXPECT_THAT(refusal("delay: 1", "delay: 0"), HasSubstr("analysis.sampled.delay: must be"));
   EXPECT_THAT(refusal(iiwa ? ", difference_velocity: true" : ", cutoff: 27.484 Hz", ""),
               HasSubstr(iiwa ? "difference_velocity: must be true" : "cutoff: must be that of"));
