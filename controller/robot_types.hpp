@@ -75,6 +75,12 @@ enum class Mode : std::uint8_t {
   kCartesian,  ///< to a pose of the tip; a redundant arm also to a posture
 };
 
+/// Through which projector N = I - X J springs and dampers of the null space act, see NullSpace.
+enum class NullProjector : std::uint8_t {
+  kDynamic,    ///< X = M^-1 J' (J M^-1 J')^-1: nothing that acts there moves the tip
+  kKinematic,  ///< X the pseudo-inverse J' (J J')^-1: a tip at rest under no load feels nothing
+};
+
 /// In whose axes K_C, C_C and `directions` are given.
 enum class Frame : std::uint8_t { kBase, kTool };
 

@@ -191,6 +191,7 @@ struct Settings {
   FeedForward feed_forward;
   Integral integral;
   TaskTerms task_terms;
+  NullProjector null_projector = NullProjector::kDynamic;
   Environment environment;
   /// Whether the joints' viscous friction in the model is subtracted from damping that is designed
   /// for a ratio. Only for friction that was measured, because modes have less than the ratio if

@@ -46,7 +46,7 @@ void take_preset(const std::string& name, int n, AuditOptions& audit) {
   audit.inertia_blocks = preset.inertia_blocks;
   audit.gains.null_stiffness.setConstant(n, preset.null_space);
   audit.gains.null_damping.setConstant(n, kPresetFactor * std::sqrt(preset.null_space));
-  audit.kinematic_null_space = true;
+  audit.null_projector = controller::NullProjector::kKinematic;
 }
 
 /// Sets the gains that stand in a configuration file.
@@ -55,6 +55,12 @@ void read_gains_file(const std::string& path, const RobotModel& model, AuditOpti
   const text::YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("gains")) throw InputError("gains", "missing");
   audit.gains = controller::read_gains(root, model);
+  const text::YamlNode* control = root.find("control");
+  for (std::size_t i = 0; control != nullptr && i + 1 < control->items.size(); i += 2) {
+    if (control->items[i].text == "null_projector" && control->items[i + 1].text == "kinematic") {
+      audit.null_projector = controller::NullProjector::kKinematic;
+    }
+  }
 } catch (const InputError& error) {
   throw error.in_file(path);
 }
@@ -118,7 +124,9 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
   if (command.mode == "joint") audit.mode = Mode::kJoint;
   if (!command.rotation.empty()) audit.half_quaternion = command.rotation == "half-quaternion";
   if (!command.null_projector.empty()) {
-    audit.kinematic_null_space = command.null_projector == "kinematic";
+    audit.null_projector = command.null_projector == "kinematic"
+                               ? controller::NullProjector::kKinematic
+                               : controller::NullProjector::kDynamic;
   }
   if (command.frame == "tool") audit.gains.frame = controller::Frame::kTool;
   controller::Gains& gains = audit.gains;

@@ -44,11 +44,6 @@ Json refusals(const TunedArm& arm, const TunedDesign& design, const controller::
                                   "configuration has to say what each joint gives"));
   }
   const controller::Gains& gains = design.settings.initial.gains;
-  const bool null_space = !gains.null_stiffness.isZero(0) || !gains.null_damping.isZero(0);
-  if (design.stated.kinematic_null_space && null_space) {
-    result.push_back(refusal_json(
-        "null_projector", "Dashpot's controller has the dynamically consistent projector alone"));
-  }
   if (design.stated.inertia_blocks) {
     result.push_back(refusal_json(
         "inertia_blocks", "Dashpot's controller does not multiply gains by the tip's inertia"));

@@ -16,6 +16,7 @@ namespace {
 using controller::InputError;
 using controller::JointVector;
 using controller::Mode;
+using controller::NullProjector;
 using text::Range;
 using text::YamlMapping;
 using text::YamlNode;
@@ -113,6 +114,7 @@ controller::Settings settings_of(const TunedArm& arm, const controller::AuditOpt
       std::min(settings.motion.smoothing, controller::kMostSmoothing * settings.period);
   settings.limits.gain_margin = stated.margin;
   settings.initial.mode = stated.mode;
+  settings.null_projector = stated.null_projector;
   controller::Gains gains = stated.gains;
   if (stated.half_quaternion) gains.task_stiffness.bottomRightCorner<3, 3>() *= 0.5;
   if (stated.mode == Mode::kCartesian) {  // those of the other mode are not looked at
@@ -228,8 +230,10 @@ TunedDesign read_design(const TunedArm& arm, const Json& design) {
               stated.mode);
   read_choice(keys, "rotation", Choices<bool>{{{"vector", false}, {"half-quaternion", true}}},
               stated.half_quaternion);
-  read_choice(keys, "null_projector", Choices<bool>{{{"dynamic", false}, {"kinematic", true}}},
-              stated.kinematic_null_space);
+  read_choice(keys, "null_projector",
+              Choices<NullProjector>{
+                  {{"dynamic", NullProjector::kDynamic}, {"kinematic", NullProjector::kKinematic}}},
+              stated.null_projector);
   read_switch(keys, "inertia_blocks", stated.inertia_blocks);
   stated.period = arm.settings().period;
   read_number(keys, "period", "s", {0, true, 1}, stated.period);
@@ -241,10 +245,10 @@ TunedDesign read_design(const TunedArm& arm, const Json& design) {
   read_switch(keys, "ideal_gravity", stated.ideal_gravity);
   stated.margin = arm.settings().limits.gain_margin;
   read_number(keys, "gain_margin", "", kMargin, stated.margin);
-  if (result.designed() && (stated.kinematic_null_space || stated.inertia_blocks)) {
+  if (result.designed() && stated.inertia_blocks) {
     throw InputError("damping",
-                     "is designed for a ratio by Dashpot's controller alone, which has neither a "
-                     "kinematic projector nor gains times the tip's inertia");
+                     "is designed for a ratio by Dashpot's controller alone, which has no gains "
+                     "times the tip's inertia");
   }
   result.settings = settings_of(arm, stated);
   return result;
@@ -269,6 +273,8 @@ Json design_json(const TunedArm& arm) {
           {"null_stiffness", of_joints(gains.null_stiffness)},
           {"null_damping",
            damping_json(gains.null_damping_ratio, Eigen::MatrixXd(null_damping.asDiagonal()))},
+          {"null_projector",
+           settings.null_projector == NullProjector::kKinematic ? "kinematic" : "dynamic"},
           {"period", settings.period},
           {"delay", sampled.delay},
           {"cutoff", sampled.cutoff},

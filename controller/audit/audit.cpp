@@ -88,18 +88,6 @@ bool read_eigenvalues(const Eigen::Ref<const Eigen::VectorXcd>& values, double s
   return ratio < kInfinity && slowest <= kRounding * std::abs(fastest);
 }
 
-/// Makes joint springs and dampers of the null space's.
-void take_into_joints(const NullSpace& null_space, Impedance& impedance) {
-  const Index n = impedance.null_stiffness.size();
-  JointMatrix projector(n, n);
-  null_projector(null_space, projector);
-  add_projected(projector, impedance.null_stiffness, impedance.joint_stiffness);
-  add_projected(projector, impedance.null_damping, impedance.joint_damping);
-  if (!impedance.null_stiffness.isZero(0)) impedance.joint_weight = 1;
-  impedance.null_stiffness.setZero();
-  impedance.null_damping.setZero();
-}
-
 }  // namespace
 
 PostureNumbers numbers_of(const analysis::Spectrum<>& spectrum) {
@@ -181,15 +169,10 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   }
   const DynamicsResult robot = evaluate(q);
   Impedance impedance = impedance_at(robot);
-  NullSpace null_space;
-  if (kinematic() && impedance.null_space()) {
-    DynamicsResult unit = robot;
-    unit.M.setIdentity();
-    null_space.compute(unit, impedance);
-    if (null_space.inertia().nearly_singular()) return audit(q).numbers;
-    take_into_joints(null_space, impedance);
-  } else if (impedance.null_space()) {
+  NullSpace null_space(options_.null_projector);
+  if (impedance.null_space()) {
     null_space.compute(robot, impedance);
+    if (kinematic() && null_space.of_projector().nearly_singular()) return audit(q).numbers;
   }
   analysis::System<kMaxJoints> system;
   LoopSystem().form(robot, impedance, null_space, arm_.friction(), system);

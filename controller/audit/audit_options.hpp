@@ -23,10 +23,9 @@ struct AuditOptions : LoopTiming {
   /// has one number for the three translations and one for the three rotations.
   bool inertia_blocks = false;
   double margin = 2;  ///< gain margin that is asked for, see PostureAudit::rotors; at least 1
-  /// True if the null space's springs and dampers act through the projector N = I - J^+ J of the
-  /// pseudo-inverse, as many controllers have it. It ignores the inertia, so that they act on the
-  /// tip as well. False: through the dynamically consistent one, see NullSpace.
-  bool kinematic_null_space = false;
+  /// Through which the null space's springs and dampers act. Many controllers have the kinematic
+  /// one.
+  NullProjector null_projector = NullProjector::kDynamic;
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
   /// Range of sampled postures, n, rad; without entries the position limits of the model.
   JointVector lower, upper;

@@ -88,12 +88,13 @@ std::optional<Settings> designing_settings(const RobotModel& model, const AuditO
                        ? gains.joint_damping_ratio > 0
                        : gains.task_damping_ratio > 0 || gains.null_damping_ratio > 0;
   if (!any) return std::nullopt;
-  require(!options.kinematic_null_space && !options.inertia_blocks && !options.half_quaternion,
-          "damping_ratio: only Dashpot's own law designs damping, with the dynamically consistent "
-          "projector, rotation vectors and gains that are not multiplied by inertia");
+  require(!options.inertia_blocks && !options.half_quaternion,
+          "damping_ratio: only Dashpot's own law designs damping, with rotation vectors and gains "
+          "that are not multiplied by inertia");
   Settings settings = default_settings(model);
   set_timing(options, settings);
   settings.limits.gain_margin = options.period > 0 ? options.margin : 1;
+  settings.null_projector = options.null_projector;
   settings.initial.gains = gains;
   Gains& stated = settings.initial.gains;
   for (JointMatrix* matrix : {&stated.joint_stiffness, &stated.joint_damping}) {

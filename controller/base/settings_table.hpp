@@ -19,13 +19,14 @@ struct Setting {
 
 /// Calls visit(setting, member) for every setting but the gains and the walls. `Struct` is
 /// Settings or const Settings. Members are double, int, bool, JointVector (n entries), Vector6 (of
-/// the tip), Mode, Load, Analysis::Where and FeedForward::FrictionAt.
+/// the tip), Mode, Load, NullProjector, Analysis::Where and FeedForward::FrictionAt.
 template <class Struct, class Visitor>
 void for_each_setting(Struct& settings, Visitor&& visit) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   visit(Setting{"control.period", "s", "", text::kPositive}, settings.period);
   visit(Setting{"control.mode"}, settings.initial.mode);
   visit(Setting{"control.load"}, settings.task_terms.load);
+  visit(Setting{"control.null_projector"}, settings.null_projector);
   visit(Setting{"control.jacobian_rate"}, settings.task_terms.jacobian_rate);
   visit(Setting{"control.subtract_friction"}, settings.subtract_friction);
 

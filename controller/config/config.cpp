@@ -97,6 +97,12 @@ class SettingsReader {
          {"joint_torques", Load::kJointTorques}}};
     read_choice(keys, key, kLoads, value);
   }
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+                   NullProjector& value) {
+    static constexpr std::array<std::pair<std::string_view, NullProjector>, 2> kProjectors = {
+        {{"dynamic", NullProjector::kDynamic}, {"kinematic", NullProjector::kKinematic}}};
+    read_choice(keys, key, kProjectors, value);
+  }
   static void read(const text::YamlMapping& keys, std::string_view key, const Setting& setting,
                    Vector6& value) {
     const std::string& linear = setting.unit;

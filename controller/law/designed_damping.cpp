@@ -25,10 +25,11 @@ void RatioDamper::update(const JointMatrix& M, const Jacobian* J) noexcept {
 }
 
 DesignedDamping::DesignedDamping(const JointVector& viscous_friction,
-                                 const analysis::BorneDamping& borne)
+                                 const analysis::BorneDamping& borne, NullProjector projector)
     : borne_(borne),
       joint_damper_(static_cast<int>(viscous_friction.size())),
-      in_force_(static_cast<int>(viscous_friction.size())) {
+      in_force_(static_cast<int>(viscous_friction.size())),
+      null_space_(projector) {
   if ((viscous_friction.array() > 0).any()) friction_ = viscous_friction;
 }
 

@@ -53,9 +53,10 @@ class RatioDamper {
 class DesignedDamping {
  public:
   /// `viscous_friction` is the friction of the robot's joints, n, N m s/rad; `borne` is what the
-  /// loop bears.
+  /// loop bears. The null space is that of `projector`.
   explicit DesignedDamping(const JointVector& viscous_friction,
-                           const analysis::BorneDamping& borne = {});
+                           const analysis::BorneDamping& borne = {},
+                           NullProjector projector = NullProjector::kDynamic);
   DesignedDamping(const DesignedDamping&) = delete;  // the dampers look at what the loop bears
   DesignedDamping& operator=(const DesignedDamping&) = delete;
 

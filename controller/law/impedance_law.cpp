@@ -119,7 +119,7 @@ void ImpedanceLaw::add_null_torque(const Input& now, LawTorque& result) noexcept
   const JointReference& posture = now.references.posture;
   JointVector& dq = result.posture_error;
   dq = difference(posture.position(), now.q);
-  const JointVector share = null_space.joint_velocity(result.tip_error);
+  const JointVector share = null_space.explained(result.tip_error);
   add(share, dq, -1 / std::sqrt(1 + product(share, share) / (kPostureShare * kPostureShare)));
   const JointVector dqd = difference(posture.velocity(), now.qd);
   add(null_space.spring(impedance.null_stiffness, dq), result.torque);

@@ -21,6 +21,10 @@ void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
     A.noalias() += y * y.transpose();
   }
   inertia_.compute(A, impedance.base, impedance.tool, robot.R_BT);
+  if (kinematic_) {
+    J_ = robot.J;
+    unit_inertia_.compute(J_ * J_.transpose(), impedance.base, impedance.tool, robot.R_BT);
+  }
   level_ = {};
   ratio_damping_.resize(0, 0);
   if (impedance.null_damping_ratio > 0 && impedance.null_space()) {
@@ -31,6 +35,10 @@ void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
 JointVector NullSpace::spring(const JointVector& k, const JointVector& dq) const noexcept {
   JointVector y(dq.size());
   for (Eigen::Index i = 0; i < dq.size(); ++i) y[i] = k[i] * dq[i];
+  if (kinematic_) {
+    project_joints(y);
+    return y;
+  }
   mass_.solve_L(y.data());
   project(y);
   mass_.multiply_L(y.data());
@@ -39,6 +47,10 @@ JointVector NullSpace::spring(const JointVector& k, const JointVector& dq) const
 
 JointVector NullSpace::projected_velocity(const JointVector& dq) const noexcept {
   JointVector y = dq;
+  if (kinematic_) {
+    project_joints(y);
+    return y;
+  }
   mass_.multiply_LT(y.data());
   project(y);
   mass_.solve_LT(y.data());
@@ -117,6 +129,13 @@ JointVector NullSpace::ratio_damper(const JointVector& dqd) const noexcept {
   add_product(ratio_damping_, y, result);
   mass_.multiply_L(result.data());
   return result;
+}
+
+JointVector NullSpace::explained(const Vector6& e) const noexcept {
+  if (!kinematic_) return joint_velocity(e);
+  JointVector dq = JointVector::Zero(J_.cols());
+  add_torque(J_, unit_inertia_.wrench(e), dq);
+  return dq;
 }
 
 JointVector NullSpace::joint_velocity(const Vector6& twist) const noexcept {

@@ -19,8 +19,17 @@ namespace dashpot::controller {
 /// bounded everywhere: G is at least Jh Jh' in the selected directions, so the eigenvalues of P are
 /// within [0, 1], and for any stiffness k and deflection dq the torque N' k N dq is at most
 ///     cond(M) max(k) |dq|.
+///
+/// NullProjector::kKinematic gives springs and dampers the same with I for M: N = I - J' H G^-1 H J
+/// with G of A = J J', symmetric, and a torque of at most max(k) |dq|. Where the tip stands still,
+/// N leaves the same motions free; but a torque N t accelerates the tip, because N is orthogonal in
+/// joint coordinates and not in energy. All else is as above: the damping for a ratio, the joint
+/// velocity of a twist, the inertia.
 class NullSpace {
  public:
+  explicit NullSpace(NullProjector projector = NullProjector::kDynamic) noexcept
+      : kinematic_(projector == NullProjector::kKinematic) {}
+
   /// Computes the null space of the directions that an impedance selects, and, if it has null-space
   /// springs and a ratio for them, the damping D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, in
   /// energy coordinates: with it every free motion has the ratio on the springs K_0. Next to a
@@ -42,6 +51,9 @@ class NullSpace {
   const JointMatrix& ratio_damping() const noexcept { return ratio_damping_; }
   /// Returns what the loop left of the ratio.
   const analysis::DampingLevel& level() const noexcept { return level_; }
+  /// Returns the part of the joints' deflection that an error e of the tip explains: J# e of the
+  /// projector, N = I - J# J in the selected directions.
+  JointVector explained(const Vector6& e) const noexcept;
   /// Returns N dq.
   JointVector projected_velocity(const JointVector& dq) const noexcept;
   /// Returns M^-1 N' t = N M^-1 t: the acceleration that a joint torque leaves in the null space.
@@ -50,6 +62,9 @@ class NullSpace {
   /// moves at `twist` in the selected directions.
   JointVector joint_velocity(const Vector6& twist) const noexcept;
   const TaskInertia& inertia() const noexcept { return inertia_; }
+  bool kinematic() const noexcept { return kinematic_; }
+  /// Returns the inertia, or, of a kinematic projector, what is in its place, with I for M.
+  const TaskInertia& of_projector() const noexcept { return kinematic_ ? unit_inertia_ : inertia_; }
   /// Returns L.
   const SmallCholesky& mass() const noexcept { return mass_; }
   /// Replaces y by P y.
@@ -58,6 +73,10 @@ class NullSpace {
   }
 
  private:
+  /// Replaces dq by N dq of the kinematic projector.
+  void project_joints(JointVector& dq) const noexcept {
+    add_torque(J_, -unit_inertia_.wrench(twist(J_, dq)), dq);
+  }
   /// Returns the damping of a free motion of a frequency, 1/s, and includes what is left of it in
   /// the level.
   struct Damping {
@@ -73,7 +92,10 @@ class NullSpace {
   /// Sets D if P is a projector on one motion; returns false if not.
   bool damp_one_motion(const JointVector& k, const Damping& damping) noexcept;
 
+  bool kinematic_;
   TaskInertia inertia_;
+  TaskInertia unit_inertia_;  ///< of a kinematic projector, as is J_
+  Jacobian J_;
   SmallCholesky mass_;
   Jacobian Jh_;
   JointMatrix ratio_damping_;

@@ -204,7 +204,7 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Actin
   std::optional<NullSpaceChange> change;
   if (acting.posture && impedance.null_space() && (loaded || terms.jacobian_rate)) {
     change.emplace(*acting.posture->kernel, *acting.posture->q, robot, null_space,
-                   !impedance.tool.none());
+                   !impedance.tool.none(), null_space.kinematic());
   }
   if (loaded) {
     std::optional<LoadedPosture> pulled;
@@ -217,7 +217,16 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Actin
   if (terms.jacobian_rate) {
     add_congruence(J, C_C, jacobian_rate(J, qd), extra);
     if (change && !D.isZero(0)) {
-      add_null_space_rate(*change, J, difference(qd, acting.posture->velocity), D, extra);
+      const JointVector past = difference(qd, acting.posture->velocity);
+      if (null_space.kinematic() && impedance.null_damping_ratio > 0) {
+        JointMatrix designed = JointMatrix::Zero(n, n);
+        add_null_damping(null_space, designed);
+        D -= designed;
+        const NullSpaceChange dynamic(*acting.posture->kernel, *acting.posture->q, robot,
+                                      null_space, !impedance.tool.none(), false);
+        add_null_space_rate(dynamic, J, past, designed, extra);
+      }
+      add_null_space_rate(*change, J, past, D, extra);
     }
   }
 

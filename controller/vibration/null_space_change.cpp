@@ -10,30 +10,34 @@ using Eigen::Vector3d;
 
 NullSpaceChange::NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q,
                                  const DynamicsResult& robot, const NullSpace& null_space,
-                                 bool in_tool_axes) noexcept
-    : tool_(in_tool_axes), J_(robot.J), mass_(kernel, q, robot.J) {
+                                 bool in_tool_axes, bool kinematic) noexcept
+    : tool_(in_tool_axes), kinematic_(kinematic), J_(robot.J), mass_(kernel, q, robot.J) {
   const Index n = J_.cols();
   share_.resize(n, 6);
+  const TaskInertia& inertia = kinematic_ ? null_space.of_projector() : null_space.inertia();
   for (Index i = 0; i < 6; ++i) {
     const Vector6 unit = Vector6::Unit(i);
-    inertia_.col(i) = null_space.inertia().wrench(unit);
-    share_.col(i) = null_space.joint_velocity(unit);
+    inertia_.col(i) = inertia.wrench(unit);
+    share_.col(i) = kinematic_ ? null_space.explained(unit) : null_space.joint_velocity(unit);
   }
   tip_torque_ = J_.transpose().lazyProduct(inertia_);
   mobility_.resize(n, n);
   for (Index i = 0; i < n; ++i) {
-    mobility_.col(i) = null_space.projected_acceleration(JointVector::Unit(n, i));
+    const JointVector unit = JointVector::Unit(n, i);
+    mobility_.col(i) =
+        kinematic_ ? null_space.projected_velocity(unit) : null_space.projected_acceleration(unit);
   }
   torque_projector_ = JointMatrix::Identity(n, n);
   torque_projector_ -= J_.transpose().lazyProduct(share_.transpose());
-  spreads_ = null_space.inertia().nearly_singular();
+  spreads_ = inertia.nearly_singular();
   if (spreads_) set_spread(null_space);
 }
 
 void NullSpaceChange::set_spread(const NullSpace& null_space) noexcept {
   const Index n = J_.cols();
+  const TaskInertia& inertia = kinematic_ ? null_space.of_projector() : null_space.inertia();
   moved_ = J_.transpose();
-  for (Index i = 0; i < 6; ++i) {
+  for (Index i = 0; i < 6 && !kinematic_; ++i) {
     null_space.mass().solve_L(&moved_(0, i));
     null_space.mass().solve_LT(&moved_(0, i));
   }
@@ -41,16 +45,21 @@ void NullSpaceChange::set_spread(const NullSpace& null_space) noexcept {
   for (Index i = 0; i < 6; ++i) {
     const JointVector x = moved_.col(i);
     const Jacobian turned = twists(x);
-    const Jacobian inert = moved_.transpose().lazyProduct(mass_.times(x));
+    const Jacobian heavier = moved_.transpose().lazyProduct(inert(x));
     for (Index k = 0; k < n; ++k) {
       // The inertia's part is symmetric, so that half of it can be mirrored.
-      change[static_cast<std::size_t>(k)].col(i) = turned.col(k) - 0.5 * inert.col(k);
+      change[static_cast<std::size_t>(k)].col(i) = turned.col(k) - 0.5 * heavier.col(k);
     }
   }
   for (Index k = 0; k < n; ++k) {
     const Matrix6& half = change[static_cast<std::size_t>(k)];
-    spread_[static_cast<std::size_t>(k)] = null_space.inertia().spread(half + half.transpose());
+    spread_[static_cast<std::size_t>(k)] = inertia.spread(half + half.transpose());
   }
+}
+
+JointMatrix NullSpaceChange::inert(const JointVector& x) const noexcept {
+  if (kinematic_) return JointMatrix::Zero(x.size(), x.size());
+  return mass_.times(x);
 }
 
 Vector6 NullSpaceChange::turning(const Vector6& V, Index k) const noexcept {
@@ -81,8 +90,8 @@ JointMatrix NullSpaceChange::torques(const Vector6& F) const noexcept {
 
 JointMatrix NullSpaceChange::of_joint_velocity(const Vector6& V) const noexcept {
   const JointVector x = share_ * V;
-  const JointMatrix inert = torques(inertia_ * V) - mass_.times(x);
-  JointMatrix change = mobility_.lazyProduct(inert);
+  const JointMatrix moved = torques(inertia_ * V) - inert(x);
+  JointMatrix change = mobility_.lazyProduct(moved);
   change -= share_.lazyProduct(twists(x));
   for (Index k = 0; spreads_ && k < change.cols(); ++k) {
     change.col(k) -= moved_ * (spread_[static_cast<std::size_t>(k)] * V);
@@ -94,7 +103,7 @@ JointMatrix NullSpaceChange::of_torque(const JointVector& t) const noexcept {
   JointVector z = JointVector::Zero(t.size());
   add_product(mobility_, t, z);
   const Vector6 h = share_.transpose() * t;
-  JointMatrix change = mass_.times(z);
+  JointMatrix change = inert(z);
   const JointMatrix projected = torques(h) + change;
   change -= torque_projector_.lazyProduct(projected);
   change -= tip_torque_.lazyProduct(twists(z));

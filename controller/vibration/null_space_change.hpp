@@ -13,14 +13,16 @@ namespace dashpot::controller {
 ///     d(N' t)/dq_k = -N' dJ_k' h - J' G dJ_k z + (1 - N') dM_k z,    h = J#' t, z = M^-1 N' t.
 /// Where the arm is nearly singular, G changes by -S_k = -TaskInertia::spread as well, which adds
 ///     -M^-1 J' S_k V    and    J' S_k J M^-1 t.
+/// Of the kinematic projector M is I, and dM_k zero.
 /// Where the selected directions turn with the tool, dJ_k is less by the turning of J's rows.
 class NullSpaceChange {
  public:
   using TipMatrix = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, kMaxJoints, 6>;
 
-  /// `robot` and `null_space` are those of the kernel at `q`.
+  /// `robot` and `null_space` are those of the kernel at `q`, whose projector or the dynamic one it
+  /// is.
   NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q, const DynamicsResult& robot,
-                  const NullSpace& null_space, bool in_tool_axes) noexcept;
+                  const NullSpace& null_space, bool in_tool_axes, bool kinematic) noexcept;
 
   /// Returns d(J# V)/dq, n x n, for a V that is constant in the axes of the selected directions.
   JointMatrix of_joint_velocity(const Vector6& V) const noexcept;
@@ -38,8 +40,11 @@ class NullSpaceChange {
   /// (dJ/dq_k)' F by columns
   JointMatrix torques(const Vector6& F) const noexcept;
   void set_spread(const NullSpace& null_space) noexcept;
+  /// (dM/dq_k x) by columns
+  JointMatrix inert(const JointVector& x) const noexcept;
 
   bool tool_;
+  bool kinematic_;
   Jacobian J_;
   MassChange mass_;
   Matrix6 inertia_;                         ///< G

@@ -153,10 +153,11 @@ DesignedDamping designed_damping(const RobotModel& model, const Settings& settin
   JointVector subtracted = JointVector::Zero(model.dof());
   if (settings.subtract_friction) subtracted = friction_left(model, settings).cwiseMax(0);
   const double margin = settings.limits.gain_margin;
-  if (margin == 1) return DesignedDamping(subtracted);
+  if (margin == 1) return DesignedDamping(subtracted, {}, settings.null_projector);
   analysis::SampledLoop loop;
   loop.friction = Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).asDiagonal();
-  return DesignedDamping(subtracted, {timed(timing_of(settings), loop), kReserve * margin});
+  return DesignedDamping(subtracted, {timed(timing_of(settings), loop), kReserve * margin},
+                         settings.null_projector);
 }
 
 analysis::System<> unbounded(const analysis::System<kMaxJoints>& system) {

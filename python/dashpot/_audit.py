@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ._core import Error, Gains
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers
-from ._robot import DIRECTIONS, Robot, check_postures, gains_text, selected
+from ._robot import DIRECTIONS, Robot, check_postures, gains_text, is_kinematic, selected
 from ._workers import Task, chunks_of, collect, workers
 
 
@@ -190,8 +190,6 @@ def _task(robot: Robot, *, task_stiffness: npt.ArrayLike | None = None,
           upper: npt.ArrayLike | None = None, outside_limits: bool = False,
           urdf_friction: bool = False) -> Task:
     """Returns the task of the gains and the loop that `audit` describes."""
-    if null_projector not in ("dynamic", "kinematic"):
-        raise Error(f"null_projector: {null_projector!r} is none of dynamic, kinematic")
     at_tip = joint_stiffness is None and joint_damping is None
     if not at_tip and not (task_stiffness is None and task_damping is None):
         raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
@@ -210,7 +208,7 @@ def _task(robot: Robot, *, task_stiffness: npt.ArrayLike | None = None,
         joint_damping=_damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"),
         null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
-                               "kinematic_null_space": null_projector == "kinematic",
+                               "kinematic_null_space": is_kinematic(null_projector),
                                "period": float(period), "delay": delay, "cutoff": float(cutoff),
                                "difference_velocity": difference_velocity,
                                "integral_time": float(integral_time),

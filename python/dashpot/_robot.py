@@ -326,6 +326,13 @@ def one_damping(part: str, stiffness: npt.ArrayLike | None, damping: npt.ArrayLi
                     f"{part}_stiffness; {part}_damping = zeros is a loop without damping")
 
 
+def is_kinematic(null_projector: str) -> bool:
+    """Returns whether this projector of the null space is the pseudo-inverse's."""
+    if null_projector not in ("dynamic", "kinematic"):
+        raise Error(f"null_projector: {null_projector!r} is none of dynamic, kinematic")
+    return null_projector == "kinematic"
+
+
 def selected(directions: Sequence[str]) -> list[bool]:
     """Returns which of the six directions are named."""
     for direction in directions:
@@ -385,24 +392,26 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
                 joint_damping: npt.ArrayLike | None = None, joint_damping_ratio: float = 0,
                 frame: str = "base", directions: Sequence[str] = DIRECTIONS,
                 external_wrench: npt.ArrayLike | None = None, load: str = "base_wrench",
-                soft_frequency: float = 0.1) -> ClosedLoop:
+                soft_frequency: float = 0.1, null_projector: str = "dynamic") -> ClosedLoop:
     """Returns the loop that Dashpot's controller closes around the robot at rest at q (n, rad).
 
     Matrices are symmetric positive semidefinite, and may be given as their diagonals. With
     `joint_stiffness` or `joint_damping` (n x n) springs are fixed to a joint position, otherwise to
     a pose of the tip, with `task_stiffness` K_C and `task_damping` C_C (6 x 6, in the axes of
     `frame`, base or tool). In the motions that the selected `directions` leave free act
-    `null_stiffness` and `null_damping` (n each). A damping ratio above 0 has the damping designed
-    for it; the robot's viscous friction comes on top, and moves the ratios. The springs hold an
-    `external_wrench` (6, of the world on the tip, in the base's axes) at q; `load` says how it moves
-    with the arm, which adds stiffness: base_wrench, tool_wrench (it turns with the tip),
-    joint_torques (its joint torques are constant).
+    `null_stiffness` and `null_damping` (n each), through the dynamically consistent projector or,
+    with a `null_projector` of "kinematic", the projector of the pseudo-inverse. A damping ratio
+    above 0 has the damping designed for it; the robot's viscous friction comes on top, and moves
+    the ratios. The springs hold an `external_wrench` (6, of the world on the tip, in the base's
+    axes) at q; `load` says how it moves with the arm, which adds stiffness: base_wrench,
+    tool_wrench (it turns with the tip), joint_torques (its joint torques are constant).
 
     Raises Error for a posture outside the position limits, gains that the controller would refuse,
     and springs with no damping or two.
     """
     if load not in LOADS:
         raise Error(f"load: {load!r} is none of {', '.join(LOADS)}")
+    kinematic = is_kinematic(null_projector)
     kind = 0 if external_wrench is None else 1 + LOADS.index(load)
     at_tip = joint_stiffness is None and joint_damping is None and joint_damping_ratio == 0
     if not at_tip and not (task_stiffness is None and task_damping is None):
@@ -423,6 +432,7 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     for doubt in gains.doubts(robot._core):
         warnings.warn(doubt, stacklevel=2)
     found = _core.closed_loop(robot._core, posture, gains, at_tip,
-                              to_vector("external_wrench", external_wrench), kind, soft_frequency)
+                              to_vector("external_wrench", external_wrench), kind, soft_frequency,
+                              kinematic)
     return ClosedLoop(found["mass"], found["damping"], found["stiffness"],
                       make_modes(found["modes"]))

@@ -42,7 +42,9 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   };
   take("half_quaternion", options.half_quaternion);
   take("inertia_blocks", options.inertia_blocks);
-  take("kinematic_null_space", options.kinematic_null_space);
+  bool kinematic = false;
+  take("kinematic_null_space", kinematic);
+  if (kinematic) options.null_projector = controller::NullProjector::kKinematic;
   take("period", options.period);
   take("delay", options.delay);
   take("cutoff", options.cutoff);

@@ -92,6 +92,13 @@ def test_a_kinematic_null_space_acts_through_the_pseudo_inverse(panda):
                                 found.workspace.smallest_ratio.worst)):
             assert fastest == pytest.approx(values.real.min(), rel=1e-9)
             assert ratio == pytest.approx((-swings.real / abs(swings)).min(), abs=1e-9)
+        damped = dict(task_stiffness=GAINS["task_stiffness"], task_damping=2 * np.sqrt(K_C))
+        loop = dashpot.closed_loop(panda, q, **damped, **null_space, null_projector="kinematic")
+        np.testing.assert_allclose(loop.stiffness, K, atol=1e-9 * abs(K).max())
+        plain = dashpot.closed_loop(panda, q, **damped, **null_space)
+        assert abs(plain.stiffness - K).max() > 0.1
+        with pytest.raises(dashpot.Error, match="null_projector: 'both'"):
+            dashpot.closed_loop(panda, q, **damped, null_projector="both")
         other = dashpot.audit(panda, q, **GAINS, **null_space).posture
         assert abs(other.fastest_pole / values.real.min() - 1) > 1e-3
 

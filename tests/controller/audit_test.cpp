@@ -171,7 +171,7 @@ TEST_F(AuditOfPanda, CountsSpringsInTheNullSpace) {
 TEST_F(AuditOfPanda, TakesTheProjectorOfThePseudoInverse) {
   options.gains.null_stiffness = JointVector::Constant(7, 10);
   options.gains.null_damping = JointVector::Constant(7, 6);
-  options.kinematic_null_space = true;
+  options.null_projector = NullProjector::kKinematic;
   const Audit audit(model, options);
   for (int k = 0; k < 50; ++k) {
     const JointVector q = audit.posture(1, k);

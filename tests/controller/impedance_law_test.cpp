@@ -50,6 +50,7 @@ struct Case {
   SpringReferences references;
   Vector3d p_d;
   Quaterniond R_d;
+  NullProjector projector = NullProjector::kDynamic;
 
   Case(const RobotModel& robot_model, Random& random)
       : model(robot_model),
@@ -72,7 +73,7 @@ struct Case {
   }
   JointVector torque(const Impedance& impedance, const FeedForward& parts, const Vector6& wrench) {
     ImpedanceLaw law(model, parts);
-    NullSpace null_space;
+    NullSpace null_space(projector);
     null_space.compute(robot, impedance);
     LawTorque result;
     law.torque({robot, q, qd, impedance, null_space, references, kEndless, wrench}, result);
@@ -148,8 +149,10 @@ TEST(JointImpedance, IsItsEquation) {
 }
 
 /// Cartesian law for any directions and frame, with the Moore-Penrose form of the projector.
-void expect_task_law(const RobotModel& model, Random& random) {
+void expect_task_law(const RobotModel& model, Random& random,
+                     NullProjector kind = NullProjector::kDynamic) {
   Case one(model, random);
+  one.projector = kind;
   const int n = one.n;
   Setpoint setpoint;
   setpoint.mode = Mode::kCartesian;
@@ -180,9 +183,11 @@ void expect_task_law(const RobotModel& model, Random& random) {
   const TipReference& path = one.references.tip;
   VectorXd tau = J.transpose() * (K_C * one.tip_error() + C_C * (path.velocity() - J * one.qd));
   if (n > held) {
-    const MatrixXd projector = MatrixXd::Identity(n, n) - pseudo * JS;
+    const MatrixXd of_angles = JS.transpose() * MatrixXd(JS * JS.transpose()).inverse();
+    const MatrixXd& inverse = kind == NullProjector::kDynamic ? pseudo : of_angles;
+    const MatrixXd projector = MatrixXd::Identity(n, n) - inverse * JS;
     const JointReference& rest = one.references.posture;
-    VectorXd share = pseudo * S * one.tip_error();
+    VectorXd share = inverse * S * one.tip_error();
     share /= std::sqrt(1 + share.squaredNorm() / 0.09);
     tau += projector.transpose() *
            (gains.null_stiffness.asDiagonal() * VectorXd(rest.position() - one.q - share) +
@@ -204,6 +209,8 @@ TEST(CartesianImpedance, IsItsEquation) {
     expect_task_law(testing::arm_model(testing::arms()[2]), random);
     expect_task_law(rough_chain(random, 9), random);
     expect_task_law(rough_chain(random, 14), random);
+    expect_task_law(testing::arm_model(testing::arms()[0]), random, NullProjector::kKinematic);
+    expect_task_law(rough_chain(random, 9), random, NullProjector::kKinematic);
   }
 }
 

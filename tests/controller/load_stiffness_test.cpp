@@ -33,6 +33,7 @@ struct HeldLoad {
   DynamicsResult robot;
   Impedance impedance{7};
   TipWrenches wrenches;
+  NullProjector projector = NullProjector::kDynamic;
   SpringReferences references{{JointVector::Ones(7), JointVector::Ones(7), 1, 1, 1, 1, 0.01, 0},
                               1e-3};
 
@@ -83,7 +84,7 @@ struct HeldLoad {
   JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there,
                      const JointVector& qd) const {
     const DynamicsResult now = at(there);
-    NullSpace null_space;
+    NullSpace null_space(projector);
     null_space.compute(now, impedance);
     LawTorque result;
     law.torque({now, there, qd, impedance, null_space, references, kUnclamped, wrenches.commanded},
@@ -126,6 +127,7 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
   for (int k = 0; k < 60; ++k) {
     HeldLoad held(random);
     const bool loaded = k % 5 > 0;
+    if (k % 2 == 1) held.projector = NullProjector::kKinematic;
     Setpoint setpoint;
     setpoint.gains = springs(random);
     if (!loaded) {  // the loop as it is analysed: null space and dampers, too
@@ -151,7 +153,7 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
       const JointMatrix added =
           stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
       analysis::System<kMaxJoints> system;
-      NullSpace null_space;
+      NullSpace null_space(held.projector);
       null_space.compute(held.robot, held.impedance);
       Settings settings;
       settings.task_terms.load = load;
@@ -190,21 +192,23 @@ TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
       setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
       if (k % 4 > 1) setpoint.gains.directions[static_cast<std::size_t>(k / 4)] = false;
       held.impedance = Impedance(setpoint, 7);
+      if (k % 8 > 3) held.projector = NullProjector::kKinematic;
       if (k % 3 == 0) held.approach_singularity(random);
       // Beyond 2 rad a deflection counts as one of 2 rad.
       if (const Vector6 e = held.hold(); e.tail<3>().norm() > 2) continue;
       held.references.posture.start(held.q + JointVector(0.2 * random.vector(7)));
       ImpedanceLaw law(held.model, {false, false, false, false, true});
-      NullSpace null_space;
+      NullSpace null_space(held.projector);
       null_space.compute(held.robot, held.impedance);
-      const bool near_it = null_space.inertia().nearly_singular();
+      const bool near_it = null_space.of_projector().nearly_singular();
       ++(near_it ? singular : regular);
       LawTorque asked;
       law.torque({held.robot, held.q, held.rest, held.impedance, null_space, held.references,
                   kUnclamped, held.wrenches.commanded},
                  asked);
       const JointVector error = asked.posture_error;
-      const NullSpaceChange change(held.kernel, held.q, held.robot, null_space, k % 2 == 1);
+      const NullSpaceChange change(held.kernel, held.q, held.robot, null_space, k % 2 == 1,
+                                   null_space.kinematic());
       const LoadedPosture posture{change, error};
       for (const Load load : {Load::kBaseWrench, Load::kToolWrench, Load::kJointTorques}) {
         const MatrixXd K = falling(
@@ -248,10 +252,11 @@ TEST(LoadStiffness, OfDampersUnderWayIsTheirDerivative) {
       setpoint.gains.task_stiffness.setZero();
       setpoint.gains.null_damping = 2 * random.vector(7).cwiseAbs();
       setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
+      if (k % 4 > 1) held.projector = NullProjector::kKinematic;
       held.impedance = Impedance(setpoint, 7);
       held.hold();
       ImpedanceLaw law(held.model, {false, false, false, false, false});
-      NullSpace null_space;
+      NullSpace null_space(held.projector);
       null_space.compute(held.robot, held.impedance);
       if (null_space.inertia().regularity() < 3e-3) continue;
       const JointVector qd = null_space.joint_velocity(random.vector(6));

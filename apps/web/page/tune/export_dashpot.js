@@ -41,8 +41,10 @@ export function configuration(of) {
   const unusual = (key, usual, name = key) =>
     (design[key] === usual && [undefined, usual].includes(loaded[key]) ? {} : {[name]: design[key]});
   const sampled = {...unusual('delay', 0), ...unusual('cutoff', 0), ...unusual('difference_velocity', false)};
-  const sections = {robot: {urdf, base, tip, ...armKeys(of)}, control: {period: design.period, mode: design.mode},
-    gains, limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
+  const projected = [design, loaded].some((one) => one.null_projector === 'kinematic')
+    ? {null_projector: design.null_projector || 'dynamic'} : {};
+  const sections = {robot: {urdf, base, tip, ...armKeys(of)},
+    control: {period: design.period, mode: design.mode, ...projected}, gains, limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
     analysis: Object.keys(sampled).length ? {sampled} : {}};
   const refused = answer.refused.map(({key, reason}) =>
     (key === 'q' ? `Here ${reason}.` : `The controller refuses it: ${key}: ${reason}.`));
@@ -136,10 +138,9 @@ export function python(of) {
     told.ratio ? `${prefix}_damping_ratio=${told.ratio}` : `${prefix}_damping=${json(compact(damping))}`,
     ...(joint ? [] : [`null_stiffness=${json(design.null_stiffness)}`,
       rest.ratio ? `null_damping_ratio=${rest.ratio}` : `null_damping=${json(nullDamping(design))}`,
-      `frame="${design.frame || 'base'}"`])];
+      `frame="${design.frame || 'base'}"`,
+      ...(design.null_projector === 'kinematic' ? ['null_projector="kinematic"'] : [])])];
   return notes([
-    design.null_projector === 'kinematic' && design.null_stiffness.some(Boolean) &&
-      `Here the null space has the dynamically consistent projector: ${kDiffers}`,
     answer.damping_level && answer.damping_level.share < 1 &&
       `The sampled loop leaves less of the ratio, which this call does not count: ${kDiffers}`,
     ...answer.refused.map(({key, reason}) => `refused: ${key}: ${reason}`)]) +
