@@ -32,7 +32,9 @@ struct DrivenPanda {
   std::optional<HostileTicks> input;
   JointVector torque;
 
-  DrivenPanda(Analysis::Where where, int every, double share) {
+  DrivenPanda(Analysis::Where where, int every, double share,
+              NullProjector projector = NullProjector::kDynamic) {
+    settings.null_projector = projector;
     settings.analysis.where = where;
     settings.analysis.every = every;
     if (every > 1) settings.task_terms = {Load::kToolWrench, true};
@@ -54,6 +56,8 @@ TEST(Realtime, UpdateNeverAllocates) {
   EXPECT_GE(allocations_of([] { ::operator delete(::operator new(100)); }), 1);
   DrivenPanda arm(Analysis::Where::kInline, 100, 0.02);
   EXPECT_EQ(allocations_of([&] { arm.run(150'000), arm.controller->reset(); }), 0);
+  DrivenPanda kinematic(Analysis::Where::kInline, 10, 0.02, NullProjector::kKinematic);
+  EXPECT_EQ(allocations_of([&] { kinematic.run(20'000); }), 0);
 }
 
 /// With the spectrum in every tick, followed and solved directly, and on a thread.
