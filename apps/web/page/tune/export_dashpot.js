@@ -44,7 +44,8 @@ export function configuration(of) {
   const projected = [design, loaded].some((one) => one.null_projector === 'kinematic')
     ? {null_projector: design.null_projector || 'dynamic'} : {};
   const sections = {robot: {urdf, base, tip, ...armKeys(of)},
-    control: {period: design.period, mode: design.mode, ...projected}, gains, limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
+    control: {period: design.period, mode: design.mode, ...projected}, gains,
+    limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
     analysis: Object.keys(sampled).length ? {sampled} : {}};
   const refused = answer.refused.map(({key, reason}) =>
     (key === 'q' ? `Here ${reason}.` : `The controller refuses it: ${key}: ${reason}.`));
