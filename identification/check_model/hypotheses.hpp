@@ -31,6 +31,7 @@ std::vector<Hypothesis> list_hypotheses(const controller::RobotDescription& robo
                                         const controller::RobotModel& model, const WeakForm& form,
                                         const Eigen::MatrixXd& model_torque);
 
+inline constexpr Eigen::Index kPayloadColumns = 10;  ///< of body_columns, in all
 /// Returns what a unit of mass (1), first moment (3) and inertia about the origin (6: xx yy zz xy
 /// xz yz), fixed to the tip link of `model`, takes in torques, n x K each: the first `count` of
 /// them.

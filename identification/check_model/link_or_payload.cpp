@@ -13,7 +13,6 @@ using Eigen::VectorXd;
 constexpr double kClearlyLess = 10;   // of a sum of squares: a link in place of the payload
 constexpr double kClearlyMore = 16;   // the payload, which has four numbers, in place of a link
 constexpr double kClearPayload = 20;  // likewise, in place of nothing
-constexpr Index kBody = 10;
 
 /// Sums of squares of fits with some of many columns.
 class SubsetFits {
@@ -70,7 +69,7 @@ LinkOrPayload link_or_payload(const LinearModel& model, const RobustFit& fit,
   std::vector<Index> all, without;
   for (Index i = 0; i < p; ++i) {
     all.push_back(i);
-    if (i < payload || i >= payload + kBody) without.push_back(i);
+    if (i < payload || i >= payload + kPayloadColumns) without.push_back(i);
   }
   VectorXd with_payload, value;
   const double least = fits.left(all, with_payload);

@@ -1,0 +1,162 @@
+#include <dashpot/identification/check_model/findings.hpp>
+#include <dashpot/identification/check_model/link_or_payload.hpp>
+#include <dashpot/text/printable.hpp>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace dashpot::identification {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+void take(const Hypothesis& hypothesis, TorqueFit& fit) {
+  for (const MatrixXd& column : hypothesis.columns) fit.add(column, kUndetermined);
+  fit.result = robust_fit(fit.linear);
+}
+
+/// What is said of the hypothesis taken last, if it has one column.
+std::string what_it_is(const Hypothesis& hypothesis, const RobustFit& result) {
+  const Index last = result.value.size() - 1;
+  return hypothesis.what + " " +
+         beside_model(result.value[last] * hypothesis.factor,
+                      std::sqrt(result.covariance(last, last)) * hypothesis.factor,
+                      " " + hypothesis.unit);
+}
+
+/// The gravity that follows of a tilt taken last.
+Eigen::Vector3d tilted_gravity(const Eigen::Vector3d& before, const RobustFit& result) {
+  const Eigen::Vector3d after = before + tilt_directions(before) * result.value.tail<2>();
+  return before.norm() * after.normalized();
+}
+
+std::string& suspicious(const Hypothesis& hypothesis, ModelCheck& check) {
+  return check.joints[static_cast<std::size_t>(hypothesis.joint)].suspicious;
+}
+
+/// Where a payload is found, asks whether a link of another mass explains as much.
+void weigh_link(TorqueFit& fit, const std::vector<Hypothesis>& hypotheses, ModelCheck& check) {
+  const LinkOrPayload found = link_or_payload(fit.linear, fit.result, hypotheses, fit.payload());
+  if (found.link == nullptr || fit.payload_known) return;
+  if (found.clearly) {
+    take(*found.link, fit);
+    add_reason(suspicious(*found.link, check),
+               "it looks as if " + what_it_is(*found.link, fit.result) +
+                   ", which explains the torques better than a payload does");
+    return;
+  }
+  check.ambiguities.push_back("link or payload: the torques are explained as well if " +
+                              found.link->what + " " + text::number(std::abs(found.mass), 2) +
+                              " kg " + (found.mass > 0 ? "more" : "less") +
+                              " than the model says as by another payload");
+  fit.spread = found.spread;
+}
+
+/// The one that lessens the weighted squares most, if one does by much; null otherwise.
+const Hypothesis* best_hypothesis(const TorqueFit& fit, const std::vector<Hypothesis>& all) {
+  const LinearModel& linear = fit.linear;
+  const RobustFit& result = fit.result;
+  VectorXd root(linear.y.size());
+  for (Index row = 0; row < root.size(); ++row) {
+    root[row] = std::sqrt(linear.used[row] * result.weight[row]) / result.sigma[row % fit.n];
+  }
+  const MatrixXd A = root.asDiagonal() * linear.A * result.scale.asDiagonal();
+  MatrixXd normal = A.transpose() * A;
+  normal.diagonal().array() += 1e-10;  // what is unseen stays where it is
+  for (Index i = 0; i < linear.prior.size(); ++i) {
+    if (linear.prior[i] < kUndetermined)
+      normal(i, i) += std::pow(result.scale[i] / linear.prior[i], 2);
+  }
+  const auto solver = normal.ldlt();
+  const VectorXd r = root.cwiseProduct(result.residual);
+  // One more number has to take a tenth of everything, or it would be found in any noise that is
+  // not white; three numbers half as much again as one.
+  double most = 0.1 * r.squaredNorm();
+  const Hypothesis* best = nullptr;
+  for (const Hypothesis& hypothesis : all) {
+    const auto count = static_cast<Index>(hypothesis.columns.size());
+    MatrixXd B(r.size(), count);
+    for (Index i = 0; i < count; ++i) {
+      B.col(i) = root.cwiseProduct(hypothesis.columns[static_cast<std::size_t>(i)].reshaped());
+    }
+    const VectorXd whole = B.colwise().squaredNorm().transpose();
+    B -= A * solver.solve(A.transpose() * B);
+    // A column that the others nearly make already, as one that was taken, is none of its own.
+    if (!(B.colwise().squaredNorm().transpose().array() > 1e-6 * whole.array()).all()) continue;
+    const MatrixXd own = B.transpose() * B;
+    const VectorXd moment = B.transpose() * r;
+    const double gain = moment.dot(own.ldlt().solve(moment)) / (count > 1 ? 1.5 : 1);
+    if (gain > most) most = gain, best = &hypothesis;
+  }
+  return best;
+}
+
+/// Returns what is said of the hypothesis taken last; "" if it is not significant.
+std::string reason_for(const Hypothesis& hypothesis, const TorqueFit& fit,
+                       const RobustFit& before) {
+  const RobustFit& result = fit.result;
+  const auto count = static_cast<Index>(hypothesis.columns.size());
+  double largest = 0;
+  for (Index i = result.value.size() - count; i < result.value.size(); ++i) {
+    largest = std::max(largest, std::abs(result.value[i]) / std::sqrt(result.covariance(i, i)));
+  }
+  constexpr double kClear = 4;  // deviations
+  if (largest < kClear) return "";
+  std::string leaves;
+  double share = 0.8;  // a joint whose residual falls by less gives no reason to speak
+  for (Index j = 0; j < fit.n; ++j) {
+    const double old = fit.rms(before.residual, before, j);
+    const double now = fit.rms(result.residual, before, j);
+    constexpr double kSmall = 0.005;  // no model is better than that
+    if (!(old > kSmall * fit.largest[j] && now / old < share)) continue;
+    share = now / old;
+    leaves = then_leaves(fit, j, now, old);
+  }
+  if (leaves.empty()) return "";
+  return "it looks as if " +
+         (count > 1 ? hypothesis.what + " elsewhere" : what_it_is(hypothesis, result)) + leaves;
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> explain(TorqueFit& fit, const controller::RobotDescription& robot,
+                                       bool tilted, ModelCheck& check) {
+  fit.narrow_payload(check);
+  std::vector<Hypothesis> hypotheses =
+      list_hypotheses(robot, fit.model, fit.form, fit.model_torque);
+  if (check.kind != TorqueKind::kWhole) {  // which says little of what the robot holds by itself
+    std::erase_if(hypotheses,
+                  [](const Hypothesis& h) { return h.what == "its torque reads" || h.gravity; });
+  }
+  check.joints.resize(static_cast<std::size_t>(fit.n));
+  const Eigen::Vector3d& before = robot.options.gravity;
+  std::optional<Eigen::Vector3d> gravity;
+  if (tilted && hypotheses.front().gravity) {
+    take(hypotheses.front(), fit);
+    check.gravity_deviation = std::sqrt(fit.result.covariance.diagonal().tail<2>().mean());
+    gravity = tilted_gravity(before, fit.result);
+  }
+  const bool explains = check.order.empty();  // of another arm's motion nothing is explained
+  const Hypothesis* best = explains ? best_hypothesis(fit, hypotheses) : nullptr;
+  if (best == nullptr || !best->gravity) weigh_link(fit, hypotheses, check);
+  for (int round = 0; round < 4 && explains; ++round) {
+    best = best_hypothesis(fit, hypotheses);
+    if (best == nullptr) break;
+    LinearModel linear = fit.linear;
+    RobustFit result = fit.result;
+    take(*best, fit);
+    const std::string reason = reason_for(*best, fit, result);
+    if (reason.empty()) {
+      fit.linear = std::move(linear);
+      fit.result = std::move(result);
+      break;
+    }
+    if (best->gravity) return tilted_gravity(before, fit.result);
+    add_reason(suspicious(*best, check), reason);
+  }
+  return gravity;
+}
+
+}  // namespace dashpot::identification

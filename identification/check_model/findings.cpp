@@ -1,0 +1,189 @@
+#include <dashpot/identification/check_model/findings.hpp>
+#include <dashpot/text/printable.hpp>
+
+#include <cmath>
+
+namespace dashpot::identification {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kKnownRotor = 0.04;  // deviation of a determined rotor, over it
+
+Estimate estimate(const TorqueFit& fit, Index i, double scale) {
+  Estimate one;
+  one.value = fit.result.value[i];
+  if (fit.unseen(i)) return one;
+  one.deviation = std::sqrt(fit.variance(i));
+  one.determined = one.deviation < std::max(0.5 * std::abs(one.value), 0.02 * scale);
+  return one;
+}
+
+/// All of a joint's rotor.
+Estimate rotor_estimate(const TorqueFit& fit, Index j) {
+  const Index i = fit.rotor(j);
+  Estimate one;
+  one.value = fit.joint(j).reflected_inertia + fit.result.value[i];
+  if (fit.unseen(i) || fit.linear.prior[i] == kHeld) return one;
+  one.deviation = std::sqrt(fit.variance(i));
+  one.determined = one.deviation < kKnownRotor * one.value;
+  return one;
+}
+
+/// Returns what is not determined of joint j, and which motion would tell.
+std::string wanted(const TorqueFit& fit, Index j, const JointCheck& joint) {
+  std::string all;
+  const Estimate& rotor = joint.reflected_inertia;
+  if (fit.linear.prior[fit.rotor(j)] == kHeld) {
+    add_reason(all, "reflected inertia: move it without a payload, or with a known one");
+  } else if (!rotor.determined && rotor.value > 3 * rotor.deviation) {
+    add_reason(all, "reflected inertia: accelerate " +
+                        text::number(rotor.deviation / (kKnownRotor * rotor.value), 2) +
+                        " times as much");
+  } else if (!rotor.determined) {
+    add_reason(all, "reflected inertia, below " +
+                        text::number(std::max(0.0, rotor.value) + 2 * rotor.deviation, 2) +
+                        fit.inertia_unit(j) + ": accelerate more");
+  }
+  if (!joint.coulomb_friction.determined || !joint.viscous_friction.determined) {
+    add_reason(all, "friction: turn it both ways, slowly and fast");
+  }
+  if (!joint.offset.determined) add_reason(all, "offset: move it at other postures of all joints");
+  return all;
+}
+
+/// What the part kept for validation says of joint j.
+void validate(const TorqueFit& fit, Index j, JointCheck& joint) {
+  std::vector<Index> kept;
+  double mean = 0, all = 0, before = 0, after = 0, neighbours = 0, last = 0;
+  for (Index k = 0; k < fit.K; ++k) {
+    const bool validates = fit.purpose[static_cast<std::size_t>(k)] == Purpose::kValidation;
+    if (!validates || !(fit.turning(j, k) > 0)) continue;
+    kept.push_back(k);
+    mean += fit.torque(j, k);
+  }
+  mean /= std::max(1.0, static_cast<double>(kept.size()));
+  const controller::Joint& model = fit.joint(j);
+  for (const Index k : kept) {
+    const Index row = k * fit.n + j;
+    const double was = fit.linear.y[row] - fit.linear.A(row, 3 * j + 1) * model.coulomb_friction -
+                       fit.linear.A(row, 3 * j + 2) * model.viscous_friction;
+    const double left = fit.result.residual[row];
+    all += std::pow(fit.torque(j, k) - mean, 2);
+    before += was * was;
+    after += left * left;
+    neighbours += left * last;
+    last = left;
+  }
+  if (!(all > 0)) return;
+  joint.explained_before = std::max(0.0, 1 - before / all);
+  joint.explained_after = std::max(0.0, 1 - after / all);
+  joint.correlation = after > 0 ? neighbours / after : 0;
+}
+
+void report_moving(const TorqueFit& fit, Index j, JointCheck& joint) {
+  joint.residual_before = fit.rms(fit.linear.y, fit.result, j);
+  joint.residual_after = fit.rms(fit.result.residual, fit.result, j);
+  joint.offset = estimate(fit, 3 * j, fit.largest[j]);
+  joint.coulomb_friction = estimate(fit, 3 * j + 1, fit.largest[j]);
+  joint.viscous_friction = estimate(fit, 3 * j + 2, fit.largest[j]);
+  joint.reflected_inertia = rotor_estimate(fit, j);
+  joint.wanted = wanted(fit, j, joint);
+  validate(fit, j, joint);
+}
+
+/// Reports a joint that hardly moves: an offset alone, which may contain static friction.
+void report_resting(const TorqueFit& fit, Index j, JointCheck& joint) {
+  VectorXd rest(fit.K), left(fit.K);
+  const Index shared = fit.linear.A.cols() - fit.payload();
+  for (Index k = 0; k < fit.K; ++k) {
+    const Index row = k * fit.n + j;
+    rest[k] = fit.linear.y[row];
+    left[k] = rest[k] - fit.linear.A.row(row).tail(shared).dot(fit.result.value.tail(shared));
+  }
+  const auto count = static_cast<double>(fit.K);
+  joint.residual_before = std::sqrt(rest.squaredNorm() / count);
+  joint.offset.value = left.mean();
+  joint.residual_after = std::sqrt((left.array() - left.mean()).matrix().squaredNorm() / count);
+  joint.wanted = "nothing: turn it both ways, faster than it did";
+}
+
+void report_payload(const TorqueFit& fit, PayloadCheck& payload) {
+  const controller::Attachment& before = fit.model.attachment();
+  const Index first = fit.payload();
+  const double mass = before.mass + fit.result.value[first];
+  const Eigen::Vector3d moment = before.first_moment + fit.result.value.segment<3>(first + 1);
+  const Eigen::MatrixXd& covariance = fit.result.covariance;
+  payload.mass.value = mass;
+  if (fit.unseen(first)) return;
+  payload.mass.deviation = std::sqrt(fit.variance(first));
+  payload.mass.determined =
+      fit.spread.size() == 0 &&
+      payload.mass.deviation < std::max(0.01 * fit.moved_mass(), 0.1 * std::abs(mass));
+  for (Index i = 0; i < 3; ++i) {
+    Estimate& one = payload.center[static_cast<std::size_t>(i)];
+    const Index at = first + 1 + i;
+    if (fit.unseen(at) || mass == 0) continue;
+    one.value = moment[i] / mass;
+    const double square = covariance(at, at) - 2 * one.value * covariance(at, first) +
+                          one.value * one.value * covariance(first, first);
+    one.deviation = std::sqrt(std::max(0.0, square)) / std::abs(mass);
+    constexpr double kKnown = 0.03;  // m
+    one.determined = mass > 3 * payload.mass.deviation && one.deviation < kKnown;
+  }
+}
+
+void report_delay(const TorqueFit& fit, Estimate& delay) {
+  delay.value = fit.delay();
+  if (fit.unseen(fit.rest_of_delay())) return;
+  delay.deviation = std::sqrt(fit.variance(fit.rest_of_delay()));
+  constexpr double kKnownDelay = 2.5e-4;  // s
+  delay.determined = delay.deviation < std::max(kKnownDelay, 0.05 * std::abs(delay.value));
+}
+
+/// Windows in which two joints or more do not fit, one after the other.
+void report_contacts(const TorqueFit& fit, std::vector<LeftOut>& contacts) {
+  for (Index k = 0; k < fit.K; ++k) {
+    int off = 0, used = 0;
+    for (Index j = 0; j < fit.n; ++j) {
+      const Index row = k * fit.n + j;
+      if (!(fit.linear.used[row] > 0)) continue;
+      ++used;
+      // Where all else fits to a thousandth, what does not is no contact yet.
+      constexpr double kSmall = 0.01;
+      const bool far = std::abs(fit.result.residual[row]) > kSmall * fit.largest[j];
+      off += fit.result.weight[row] < 0.05 && far ? 1 : 0;
+    }
+    if (off < std::min(2, std::max(1, used))) continue;
+    const WeakForm::Window& window = fit.form.windows()[static_cast<std::size_t>(k)];
+    if (!contacts.empty() && contacts.back().record == window.record &&
+        contacts.back().to >= window.from) {
+      contacts.back().to = window.to;
+    } else {
+      contacts.push_back({window.record, window.from, window.to});
+    }
+  }
+  // A single window is a joint that turns just then, more often than a touch.
+  std::erase_if(contacts,
+                [&fit](const LeftOut& one) { return one.to - one.from < 1.2 * fit.form.width(); });
+}
+
+}  // namespace
+
+void report(const TorqueFit& fit, ModelCheck& check) {
+  for (Index j = 0; j < fit.n; ++j) {
+    JointCheck& joint = check.joints[static_cast<std::size_t>(j)];
+    joint.moves = fit.moves[j];
+    (joint.moves ? report_moving : report_resting)(fit, j, joint);
+  }
+  report_payload(fit, check.payload);
+  report_delay(fit, check.delay);
+  const Index always = fit.rest_of_delay() + 1;
+  check.covariance = fit.result.covariance.topLeftCorner(always, always);
+  if (check.order.empty()) report_suspicions(fit, check);
+  report_ambiguities(fit, check);
+  report_contacts(fit, check.contacts);
+}
+
+}  // namespace dashpot::identification
