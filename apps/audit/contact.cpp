@@ -101,6 +101,7 @@ void run_contact(const ContactCommand& command) try {
   ContactReport report;
   report.options = command.options;
   report.asked = command.asked;
+  report.options.most = std::max(report.options.most, 1.01 * command.asked);
   if (!command.direction.empty()) report.options.direction = read_direction(command.direction);
   if (!command.plot.empty()) check_plot_name(command.plot);
   const AuditTask task = read_task(command.audit);
@@ -150,7 +151,7 @@ void add_contact(CLI::App& program) {
       ->transform(quantity("kg", 0, kMost, "a mass of at least 0, in kg,"))
       ->option_text("M (0)");
   command->add_option("--touch", options->asked, "Stiffness that it is to bear: says whether")
-      ->transform(quantity("N/m", 0, kMost, "a stiffness of at least 0, in N/m,"))
+      ->transform(quantity("N/m", 0, 1e12, "a stiffness from 0 to 1e12, in N/m,"))
       ->option_text("K");
   command->add_option("--plot", options->plot, "Draw ratio and frequency over the stiffness there")
       ->option_text("FILE.svg|FILE.png");

@@ -55,6 +55,18 @@ bool bears(const ContactReport& report) {
   return report.asked < (std::isnan(limit.lower) ? limit.stiffness : limit.lower);
 }
 
+/// How many postures of the workspace have no limit although the arm can hold itself there.
+std::size_t without_limit(const ContactReport& report) {
+  return report.workspace.size() - not_held(report) - ranking(report.workspace).size();
+}
+
+/// How many postures of the workspace bear less than what was asked for.
+std::size_t bearing_less(const ContactReport& report) {
+  return static_cast<std::size_t>(std::count_if(
+      report.workspace.begin(), report.workspace.end(),
+      [&](const auto& one) { return one.held && one.touch.limit.stiffness <= report.asked; }));
+}
+
 std::string verdict(const AuditTask& task, const ContactReport& report) {
   const ContactAt& touch = report.posture.touch;
   const bool known = !controller::unknown_rotors(task.model).any();
@@ -75,6 +87,10 @@ std::string verdict(const AuditTask& task, const ContactReport& report) {
   if (report.asked > 0) {
     text += "; of the " + format_number(report.asked, 4) +
             " N/m asked for: " + (bears(report) ? "yes" : "no");
+    if (!report.workspace.empty()) {
+      text += " here, and no at " + std::to_string(bearing_less(report)) + " of " +
+              count(static_cast<std::int64_t>(report.workspace.size()), "posture");
+    }
   }
   return text + (report.posture.passivity.passive ? "; passive." : "; not passive.");
 }
@@ -176,7 +192,8 @@ std::string workspace_table(const ContactReport& report) {
   const std::vector<std::size_t> order = ranking(report.workspace);
   std::string text =
       "\nOver " + count(static_cast<std::int64_t>(report.workspace.size()), "posture");
-  text += ", " + std::to_string(not_held(report)) + " of them too heavy for the arm to hold" +
+  text += ", " + std::to_string(not_held(report)) + " of them too heavy for the arm to hold, " +
+          std::to_string(without_limit(report)) + " where the tip cannot move so" +
           (report.interrupted ? " (interrupted: no more were done)" : "") + "\n";
   if (order.empty()) return text + "  None with a limit.\n";
   const PostureContact& worst = report.workspace[order.front()];
@@ -236,12 +253,14 @@ std::string contact_json(const AuditTask& task, const ContactReport& report) {
     posture["limit_with_rotors"] = report.limit_with_rotors;
   if (report.asked > 0) {
     result["asked"] = {{"stiffness", report.asked}, {"stable", bears(report)}};
+    if (!report.workspace.empty()) result["asked"]["postures_unstable"] = bearing_less(report);
   }
   if (report.workspace.empty()) return json_text(result);
   const std::vector<std::size_t> order = ranking(report.workspace);
   Json& workspace = result["workspace"];
   workspace = {{"samples", report.workspace.size()},
                {"not_held", not_held(report)},
+               {"without_limit", without_limit(report)},
                {"interrupted", report.interrupted}};
   if (order.empty()) return json_text(result);
   const ContactAt& worst = report.workspace[order.front()].touch;

@@ -20,13 +20,15 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using identification::ModelCheck;
 
-/// Frequencies and ratios, one after the other.
-VectorXd modes_of(const RobotModel& model, const Config& config, const JointVector& q) {
-  const controller::Settings& settings = config.settings;
+analysis::SampledSpectrum spectrum_of(const RobotModel& model, const controller::Settings& settings,
+                                      const JointVector& q) {
   controller::PostureLoop loop(model, settings);
   const controller::LoopAt at = loop.at(q, settings.initial.gains, settings.initial.mode);
-  const auto modes =
-      analysis::sample_loop(at.system, analysis::analyze(at.system), at.sampled).modes;
+  return analysis::sample_loop(at.system, analysis::analyze(at.system), at.sampled);
+}
+
+/// Frequencies and ratios, one after the other.
+VectorXd values_of(const std::vector<analysis::SampledMode>& modes) {
   VectorXd values(2 * static_cast<Index>(modes.size()));
   for (std::size_t i = 0; i < modes.size(); ++i) {
     values[2 * static_cast<Index>(i)] = modes[i].natural_frequency;
@@ -74,10 +76,20 @@ RobotDescription calibrated_robot(const Config& config, const ModelCheck& check)
   return robot;
 }
 
-std::vector<CalibratedMode> calibrated_modes(const Config& config, const ModelCheck& check,
-                                             const JointVector& q) {
+CalibratedLoop calibrated_loop(const Config& config, const ModelCheck& check,
+                               const JointVector& q) {
   const RobotDescription robot = calibrated_robot(config, check);
-  const VectorXd values = modes_of(robot.model(), config, q);
+  controller::Settings settings = config.settings;
+  // A torque that is held for a period acts half a period late already.
+  const double ticks = check.delay.value / settings.period - 0.5;
+  CalibratedLoop loop;
+  int& delay = settings.analysis.sampled.delay;
+  loop.delay_found = check.delay.determined && std::round(ticks) > delay;
+  if (loop.delay_found) delay = static_cast<int>(std::round(ticks));
+  loop.delay = delay;
+  const analysis::SampledSpectrum spectrum = spectrum_of(robot.model(), settings, q);
+  loop.stable = spectrum.stable();
+  const VectorXd values = values_of(spectrum.modes);
   const Index n = config.model.dof();
   std::vector<Index> which;
   for (Index j = 0; j < n; ++j) which.push_back(3 * j + 2);
@@ -88,16 +100,15 @@ std::vector<CalibratedMode> calibrated_modes(const Config& config, const ModelCh
   for (std::size_t k = 0; k < which.size(); ++k) {
     // As far as the parameter is known, but no farther than the modes are linear in it.
     const double step = std::min(1e-4, 0.1 * std::sqrt(check.covariance(which[k], which[k])));
-    const VectorXd there = modes_of(moved(robot, which[k], step), config, q);
+    const VectorXd there = values_of(spectrum_of(moved(robot, which[k], step), settings, q).modes);
     J.col(static_cast<Index>(k)) = (there - values) / step;
   }
   const MatrixXd covariance = J * check.covariance(which, which) * J.transpose();
-  std::vector<CalibratedMode> modes;
   for (Index i = 0; i + 1 < values.size(); i += 2) {
-    modes.push_back({values[i], std::sqrt(std::max(0.0, covariance(i, i))), values[i + 1],
-                     std::sqrt(std::max(0.0, covariance(i + 1, i + 1)))});
+    loop.modes.push_back({values[i], std::sqrt(std::max(0.0, covariance(i, i))), values[i + 1],
+                          std::sqrt(std::max(0.0, covariance(i + 1, i + 1)))});
   }
-  return modes;
+  return loop;
 }
 
 }  // namespace dashpot::apps

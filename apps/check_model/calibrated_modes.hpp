@@ -11,11 +11,11 @@ namespace dashpot::apps {
 controller::RobotDescription calibrated_robot(const controller::Config& config,
                                               const identification::ModelCheck& check);
 
-/// Returns the modes of the sampled loop that the configuration's gains make with this robot at the
-/// posture `q`. With J, how they change with the parameters, by differences, and P, the parameters'
-/// covariance, theirs is J P J'.
-std::vector<CalibratedMode> calibrated_modes(const controller::Config& config,
-                                             const identification::ModelCheck& check,
-                                             const controller::JointVector& q);
+/// Returns the sampled loop that the configuration's gains make with this robot at the posture `q`,
+/// with the determined delay where that is longer than the configuration's. With J, how the modes
+/// change with the parameters, by differences, and P, the parameters' covariance, theirs is J P J'.
+CalibratedLoop calibrated_loop(const controller::Config& config,
+                               const identification::ModelCheck& check,
+                               const controller::JointVector& q);
 
 }  // namespace dashpot::apps

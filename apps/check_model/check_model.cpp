@@ -71,7 +71,7 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
                                                {options.validation, options.payload == "known"});
     if (options.calibrates && report.check.order.empty()) {
       report.rest = rest_of(records);
-      report.modes = calibrated_modes(config, report.check, report.rest);
+      report.loop = calibrated_loop(config, report.check, report.rest);
     }
   } catch (const controller::InvalidModel&) {
     throw;

@@ -107,16 +107,26 @@ std::string determined_text(const CheckModelReport& report) {
 }
 
 std::string modes_text(const CheckModelReport& report) {
-  if (report.modes.empty()) return "";
+  const CalibratedLoop& loop = report.loop;
+  if (loop.modes.empty()) return "";
   TextTable table(
       {{Align::kLeft, {"natural frequency", "rad/s"}}, {Align::kLeft, {"damping ratio", ""}}});
-  for (const CalibratedMode& mode : report.modes) {
+  for (const CalibratedMode& mode : loop.modes) {
+    if (std::isnan(mode.natural_frequency)) {
+      table.add_row({"none in the sampled loop", "-"});
+      continue;
+    }
     table.add_row({estimate_text({mode.natural_frequency, mode.natural_frequency_std, true}),
                    estimate_text({mode.damping_ratio, mode.damping_ratio_std, true})});
   }
   std::string text = "\nModes of the calibrated loop, at q =";
   for (const double q : report.rest) text += " " + format_number(q, 3);
-  return text + "\n" + table.text();
+  text += ", with a delay of " + count(loop.delay, "tick") +
+          (loop.delay_found ? ", as the records have it; the configuration knows less: "
+                              "analysis.sampled.delay\n"
+                            : "\n");
+  if (!loop.stable) text += "  These gains make this loop UNSTABLE: do not run it.\n";
+  return text + table.text();
 }
 
 std::string payload_text(const ModelCheck& check) {
@@ -246,7 +256,7 @@ Json check_model_json(const CheckModelReport& report) {
   payload["center_std"] = std::move(center_std);
   payload["determined"] = determined;
   Json modes = Json::array();
-  for (const CalibratedMode& mode : report.modes) {
+  for (const CalibratedMode& mode : report.loop.modes) {
     modes.push_back({{"natural_frequency", mode.natural_frequency},
                      {"natural_frequency_std", mode.natural_frequency_std},
                      {"damping_ratio", mode.damping_ratio},
@@ -275,6 +285,7 @@ Json check_model_json(const CheckModelReport& report) {
     result["validation"] = check.validation;
     result["q"] = json_list(report.rest);
     result["modes"] = std::move(modes);
+    result["loop"] = {{"delay", report.loop.delay}, {"stable", report.loop.stable}};
   }
   return result;
 }

@@ -15,6 +15,14 @@ struct CalibratedMode {
   double damping_ratio = 0, damping_ratio_std = 0;
 };
 
+/// The loop that the configuration's gains make with the calibrated arm.
+struct CalibratedLoop {
+  int delay = 0;                      ///< ticks: the configuration's, or the determined one
+  bool delay_found = false;           ///< it is the determined one
+  bool stable = true;                 ///< no discrete eigenvalue reaches the unit circle
+  std::vector<CalibratedMode> modes;  ///< by falling frequency
+};
+
 struct CheckModelReport {
   identification::ModelCheck check;
   std::vector<std::string> files;
@@ -23,7 +31,7 @@ struct CheckModelReport {
   std::vector<std::string> notes;
   bool calibrates = false;  ///< of `dashpot calibrate`
   controller::JointVector rest;
-  std::vector<CalibratedMode> modes;  ///< at `rest`, with the gains of the configuration
+  CalibratedLoop loop;  ///< at `rest`, with the gains of the configuration
 };
 
 /// "12.345 +- 0.012": two digits of the deviation, and as many of the value; "?" if the records do

@@ -2,6 +2,7 @@
 #include <dashpot/apps/check_model/written_arm.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/controller/drives.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -98,6 +99,12 @@ std::vector<ConfigChange> changes_for(const std::string& from_file, const std::s
     const JointVector values = determined(config, check, figure);
     if (figure == ArmFigure::kReflectedInertia && values.isZero(0)) continue;
     changes.push_back({{"robot", place_of(figure).key}, yaml_list(values)});
+    if (figure == ArmFigure::kReflectedInertia &&
+        config.robot.options.torque_loop_inertia_ratio.size() >
+            0) {  // which the inertias have in them
+      changes.push_back(
+          {{"robot", "torque_loop_inertia_ratio"}, yaml_list(JointVector::Ones(values.size()))});
+    }
   }
   if (check.gravity) changes.push_back({{"robot", "gravity"}, yaml_list(*check.gravity)});
   if (const auto payload = determined_payload(check)) {
@@ -110,6 +117,11 @@ std::vector<ConfigChange> changes_for(const std::string& from_file, const std::s
   if (from != to) {
     const std::string urdf = fs::relative(config.robot.urdf, to).generic_string();
     changes.push_back({{"robot", "urdf"}, nlohmann::json(urdf).dump()});
+    const std::string& drives = config.robot.options.drives;
+    if (controller::is_drives_file(drives)) {
+      const std::string file = fs::relative(drives, to).generic_string();
+      changes.push_back({{"robot", "drives"}, nlohmann::json(file).dump()});
+    }
   }
   return changes;
 }

@@ -27,6 +27,7 @@ controller::RobotModel part_of_arm(const controller::RobotDescription& robot,
   options.reflected_inertia =
       model.joint_values(&controller::Joint::reflected_inertia).head(joint + 1);
   options.viscous_friction = options.coulomb_friction = {};
+  options.torque_loop_inertia_ratio = options.gear_stiffness = options.gear_damping = {};
   part.tip = kdl_chain(model).getSegment(static_cast<unsigned>(joint)).getName();
   return part.model();
 }

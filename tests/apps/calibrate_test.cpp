@@ -92,5 +92,24 @@ TEST_F(CalibrateProgram, PrintsWhatIsDeterminedAndModes) {
                  "--write-drives: the name has to end with .yaml");
 }
 
+TEST_F(CalibrateProgram, SaysThatTheLoopIsUnstableWithTheGainsAtHand) {
+  const std::string robot = "robot:\n  urdf: " + testing::arm_path("panda") +
+                            "\n  base: panda_link0\n  tip: panda_hand_tcp\n"
+                            "  reflected_inertia: 30 kg m^2\n  torque_loop_inertia_ratio: 0.9\n";
+  const auto loop_with = [&](const std::string& damping) {
+    const std::string config =
+        scratch_.write("gains.yaml", robot +
+                                         "control: {mode: joint}\n"
+                                         "gains: {joint: {stiffness: 100, damping: " +
+                                         damping + "}}\n");
+    return run_program({"calibrate", file_, "--config", config, "--payload", "known"});
+  };
+  const Outcome calm = loop_with("10"), fierce = loop_with("1000");
+  EXPECT_EQ(calm.status, 0) << calm.err;
+  EXPECT_THAT(calm.out, HasSubstr("with a delay of 0 ticks"));
+  EXPECT_THAT(calm.out, ::testing::Not(HasSubstr("UNSTABLE")));
+  EXPECT_THAT(fierce.out, HasSubstr("These gains make this loop UNSTABLE")) << fierce.err;
+}
+
 }  // namespace
 }  // namespace dashpot::tests

@@ -81,7 +81,7 @@ TEST(ContactOfAnArm, RefusesWhatIsNoTouch) {
     EXPECT_EQ(outcome.out, "");
     return outcome.err;
   };
-  EXPECT_THAT(refusal({"--touch=-1"}), HasSubstr("--touch: a stiffness of at least 0"));
+  EXPECT_THAT(refusal({"--touch=-1"}), HasSubstr("--touch: a stiffness from 0"));
   EXPECT_THAT(refusal({"--damper=-1"}), HasSubstr("--damper: a damping of at least 0"));
   EXPECT_THAT(refusal({"--mass=-1"}), HasSubstr("--mass: a mass of at least 0"));
   EXPECT_THAT(refusal({"--direction", "0,0,0"}), HasSubstr("--direction: is zero"));
