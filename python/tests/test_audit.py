@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dashpot
-from conftest import HOME
+from conftest import HOME, ROOT
 
 GAINS = dict(task_stiffness=[200, 200, 200, 20, 20, 20], damping_factor=2.0)
 
@@ -209,7 +209,8 @@ def test_unknown_rotors_are_said_to_be_so_with_what_would_be_enough(root, panda)
         dashpot.Robot.from_urdf(*model, drives="pandas")
 
 
-def test_contact_turns_where_the_curve_crosses_zero(panda):
+def test_contact_turns_where_the_curve_crosses_zero():
+    panda = dashpot.Robot.from_urdf(ROOT / "sim/models/panda.urdf", "panda_link0", "panda_hand_tcp", drives="panda")
     stated = dict(**GAINS, delay=1, ideal_gravity=True)
     least = dashpot.contact(panda, HOME, **stated)
     assert least.limit_lower < least.limit < least.limit_upper and not least.passive
