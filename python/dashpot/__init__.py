@@ -14,8 +14,7 @@ __build__ = _load_core()  # for which processors the code in use was compiled
 from ._analysis import (  # isort: skip
     DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities, design_damping, modes, receptance, response,
     sampled_modes, sensitivities)
-from ._audit import (
-    Audit, Contact, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit, audit, contact)
+from ._audit import Audit, Contact, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit, audit, contact
 from ._controller import Controller, Setpoint, Snapshot, Status, TrackedModes, TrackedSampledModes
 from ._core import Error
 from ._identification import Identification, MeasuredModes, identify

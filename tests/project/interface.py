@@ -23,8 +23,7 @@ SCENE = SOURCE / "sim/scenes/panda_push_held.yaml"
 
 
 def run(*command, text=None):
-    return subprocess.run([PROGRAM, *command], input=text, text=True, check=False,
-                          stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return subprocess.run([PROGRAM, *command], input=text, text=True, check=False, capture_output=True)
 
 
 def symbols(library):
