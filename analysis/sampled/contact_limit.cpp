@@ -224,28 +224,28 @@ void prove(const TouchedLoop& loop, ContactLimit& result) {
 }  // namespace
 
 ContactLimit contact_limit(const System<>& system, const Spectrum<>& spectrum,
-                           const SampledLoop& given, const Touch& touch, bool proved) {
-  const TouchedLoop loop(system, spectrum, given, touch);
+                           const SampledLoop& loop, const Touch& touch, bool proved) {
+  const TouchedLoop touched(system, spectrum, loop, touch);
   ContactLimit result;
-  find_limit(loop, touch, result);
-  result.stable_if_rigid = loop.stable_if_rigid();
+  find_limit(touched, touch, result);
+  result.stable_if_rigid = touched.stable_if_rigid();
   if (!(result.stiffness > 0) || std::isinf(result.stiffness)) {
     result.lower = result.upper = result.stiffness;
     return result;
   }
-  if (proved || !loop.counted()) polish(loop, result);
-  if (proved) prove(loop, result);
+  if (proved || !touched.counted()) polish(touched, result);
+  if (proved) prove(touched, result);
   return result;
 }
 
 std::vector<ContactPoint> contact_curve(const System<>& system, const Spectrum<>& spectrum,
-                                        const SampledLoop& given, const Touch& touch,
+                                        const SampledLoop& loop, const Touch& touch,
                                         const std::vector<double>& stiffness) {
-  const TouchedLoop loop(system, spectrum, given, touch);
+  const TouchedLoop touched(system, spectrum, loop, touch);
   std::vector<ContactPoint> points;
   for (const double k : stiffness) {
     require("contact", std::isfinite(k) && k >= 0, "stiffness must be finite and not negative");
-    points.push_back(point_of(loop.solve(k), loop.period()));
+    points.push_back(point_of(touched.solve(k), touched.period()));
   }
   return points;
 }

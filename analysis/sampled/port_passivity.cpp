@@ -83,6 +83,7 @@ std::vector<double> angles(int delay) {
   constexpr double kLeast = 1e-6;
   const int even = kEven + kEvenPerTick * delay;
   std::vector<double> result;
+  result.reserve(static_cast<std::size_t>(kSmall + even));
   for (int i = 0; i < kSmall; ++i) {
     result.push_back(kLeast * std::pow(kPi / even / kLeast, static_cast<double>(i) / kSmall));
   }
