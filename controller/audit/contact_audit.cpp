@@ -81,7 +81,8 @@ ContactAt worst_of_thirteen(const TouchingTip& tip) {
   ContactAt best;
   best.limit.stiffness = std::numeric_limits<double>::infinity();
   for (int i = 26; i > 13; --i) {  // (i - 13) and its negative are one direction
-    const Vector3d n = (Vector3d(i % 3, i / 3 % 3, i / 9) - Vector3d::Ones()).normalized();
+    const int second = i / 3 % 3, third = i / 9;
+    const Vector3d n = (Vector3d(i % 3, second, third) - Vector3d::Ones()).normalized();
     if (best.direction.isZero() && tip.moves(n)) best.direction = n;
     tip.take_if_worse(n, best);
   }

@@ -53,7 +53,7 @@ constexpr std::array kRows = {
 struct Held {
   int inside = 0, all = 0;
 
-  void add(const Estimate& one, double truth) {
+  void add(const dashpot::identification::Estimate& one, double truth) {
     if (!std::isfinite(one.deviation)) return;
     ++all;
     inside += std::abs(one.value - truth) <= 1.96 * one.deviation ? 1 : 0;
@@ -75,9 +75,9 @@ double processor_seconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-void add(const MovedArm& arm, const ModelCheck& check, Tally& tally) {
+void add(const MovedArm& arm, const dashpot::identification::ModelCheck& check, Tally& tally) {
   for (Index j = 0; j < arm.n; ++j) {
-    const JointCheck& joint = check.joints[static_cast<std::size_t>(j)];
+    const dashpot::identification::JointCheck& joint = check.joints[static_cast<std::size_t>(j)];
     ++tally.joints;
     tally.rotors.add(joint.reflected_inertia, arm.rotors[j]);
     tally.friction.add(joint.coulomb_friction, arm.coulomb[j]);
@@ -158,16 +158,18 @@ bool calibrate(const Request& request) {
           Eigen::AngleAxisd(row.tilt, Eigen::Vector3d(std::cos(heading), std::sin(heading), 0)) *
           arm.gravity;
       if (row.heavier > 0) arm.make_heavier(arm.n - 3, row.heavier);
-      const TorqueRecord record = arm.record(dice);
+      const dashpot::identification::TorqueRecord record = arm.record(dice);
       double begin = processor_seconds();
-      const ModelCheck check = check_model(arm.description, {record}, {0.2, false});
+      const dashpot::identification::ModelCheck check =
+          dashpot::identification::check_model(arm.description, {record}, {0.2, false});
       tally.time += processor_seconds() - begin;
       add(arm, check, tally);
       begin = processor_seconds();
-      const std::vector<Estimate> plain = rotors_by_least_squares(arm.description, record);
+      const std::vector<dashpot::identification::Estimate> plain =
+          rotors_by_least_squares(arm.description, record);
       tally.plain_time += processor_seconds() - begin;
       for (Index j = 0; j < arm.n; ++j) {
-        const Estimate& one = plain[static_cast<std::size_t>(j)];
+        const dashpot::identification::Estimate& one = plain[static_cast<std::size_t>(j)];
         tally.plain.add(one, arm.rotors[j]);
         tally.plain_within += std::abs(one.value / arm.rotors[j] - 1) <= kKnownWithin ? 1 : 0;
       }
