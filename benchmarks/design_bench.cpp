@@ -14,6 +14,7 @@
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/analysis/ratio_damping.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -145,7 +146,7 @@ void contact(benchmark::State& state, bool proved) {
   const dashpot::analysis::TaskImpedance arm = configurations(state.range(0)).front();
   const auto design = design_damping(arm, DampingTarget::constant(kRatio));
   const auto system = to_joint_space(with_damping(arm, design.damping));
-  const auto spectrum = analyze(system);
+  const auto spectrum = dashpot::analysis::analyze(system);
   dashpot::analysis::SampledLoop loop;
   loop.delay = static_cast<int>(state.range(1));
   dashpot::analysis::Touch touch;
