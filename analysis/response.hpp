@@ -15,7 +15,7 @@ struct Motion {
   Eigen::VectorXd zero_mode_velocity;  ///< n
 };
 
-/// What sets a system in motion, n entries each; what is not given is zero.
+/// Causes of a motion, n entries each; a cause that is not given is zero.
 struct Cause {
   std::optional<Eigen::VectorXd> position;  ///< q(0)
   std::optional<Eigen::VectorXd> velocity;  ///< q'(0)

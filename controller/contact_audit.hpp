@@ -8,8 +8,8 @@
 
 namespace dashpot::controller {
 
-/// What an arm touches with its tip: a spring of any stiffness, with a damper and a mass, along one
-/// direction.
+/// The surroundings that a tip touches: a spring of any stiffness, with a damper and a mass, along
+/// one direction.
 struct ContactOptions {
   /// In the base's axes, of any length but zero; none: the direction that bears least.
   std::optional<Eigen::Vector3d> direction;
@@ -18,13 +18,13 @@ struct ContactOptions {
   double most = 1e9;   ///< stiffness up to which a limit is looked for, N/m
 };
 
-/// What a loop bears at a posture: the limit in a direction.
+/// The largest stable stiffness at a posture, in one direction.
 struct ContactAt {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of length 1, in the base's axes
   analysis::ContactLimit limit;
 };
 
-/// What the joints can give in a direction beside the weight of the arm.
+/// The largest force of the joints in a direction, beside the weight of the arm.
 struct HeldForce {
   Eigen::Vector3d direction;  ///< in which the tip presses, of length 1, in the base's axes
   double force = 0;           ///< until a joint is at its effort limit, N; infinite: none is

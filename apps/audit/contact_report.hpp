@@ -16,7 +16,7 @@ struct PostureContact {
   controller::ContactAt touch;
 };
 
-/// What `dashpot contact` found.
+/// The results of `dashpot contact`.
 struct ContactReport {
   controller::ContactOptions options;
   double asked = 0;  ///< stiffness that the arm is to touch, N/m; 0: none

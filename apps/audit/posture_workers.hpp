@@ -12,7 +12,7 @@
 
 namespace dashpot::apps {
 
-/// What is found at many postures in order, or at the first ones if the user stops it. Chunks are
+/// Results at many postures in order, or at the first ones if the user stops it. Chunks are
 /// handed out in order, so that what is done when the threads end has no gap.
 template <class Found>
 class PostureWorkers {

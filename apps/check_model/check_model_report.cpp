@@ -93,7 +93,7 @@ std::string delay_text(const Estimate& delay) {
          (delay.value < 0 ? ", that is, they were measured late\n" : "\n");
 }
 
-/// What the records determine, and what would determine the rest.
+/// The count of determined parameters, and the motion that would determine each of the others.
 std::string determined_text(const CheckModelReport& report) {
   const ModelCheck& check = report.check;
   std::string text = "The records determine " + std::to_string(check.rank) + " of " +

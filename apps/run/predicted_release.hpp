@@ -8,7 +8,7 @@
 
 namespace dashpot::apps {
 
-/// What the modes have in the motion with which a scene begins.
+/// The shares of the modes in the motion with which a scene begins.
 struct PredictedRelease {
   analysis::Spectrum<> spectrum;
   analysis::ModeShares shares;

@@ -4,6 +4,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/sim/linear_system.hpp>
+#include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
@@ -18,20 +19,9 @@ namespace {
 using controller::JointVector;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::plant_options;
 using testing::Random;
 using testing::spectrum_of;
-
-/// A simulated robot behind the drives that the analysis of a sampled loop supposes, with one step
-/// of the integrator in a period.
-sim::PlantOptions plant_options(const analysis::SampledLoop& loop) {
-  sim::PlantOptions options;
-  options.period = loop.period;
-  options.integrator.max_step = loop.period;
-  options.delay = loop.delay;
-  options.torque_cutoff = loop.torque_cutoff;
-  options.difference_velocity = loop.difference_velocity;
-  return options;
-}
 
 /// Growth of a size from the first to the last tenth of the ticks.
 template <class Step>
