@@ -74,6 +74,13 @@ TEST(ContactOfAnArm, OverPosturesDoesNotDependOnJobs) {
   EXPECT_GT(heavy["not_held"], 5);
 }
 
+TEST(ContactOfAnArm, JudgesWhatIsAskedForAtEveryPosture) {
+  const Json asked = contact({"--drives", "panda", "--samples", "20", "--touch", "2.3e6"})["asked"];
+  EXPECT_TRUE(asked["stable"].get<bool>());
+  EXPECT_GT(asked["postures_unstable"].get<int>(), 0);
+  EXPECT_LT(asked["postures_unstable"].get<int>(), 20);
+}
+
 TEST(ContactOfAnArm, RefusesWhatIsNoTouch) {
   const auto refusal = [](const Words& more) {
     const Outcome outcome = run_program(of_panda("contact", joined(kCrisp, more)));
