@@ -21,7 +21,8 @@ using dashpot::stress::Request;
 using Eigen::Index;
 
 constexpr double kKnownWithin = 0.1;  // of a rotor that is called determined
-constexpr double kLeastHeld = 0.88, kMostHeld = 0.99;
+constexpr double kNominal = 0.95;  // share of truths within 95 % intervals
+constexpr double kLeastHeld = 0.9, kMostHeld = 0.98;
 constexpr double kAllRecords = 60;
 
 /// A row of the table.
@@ -58,9 +59,10 @@ struct Held {
     ++all;
     inside += std::abs(one.value - truth) <= 1.96 * one.deviation ? 1 : 0;
   }
+  /// Whether the share is 90 to 98 %, but for two standard deviations of chance.
   bool good() const {
-    constexpr int kFew = 40;  // of which more may miss by chance
-    return all < kFew || (inside >= kLeastHeld * all && inside <= kMostHeld * all);
+    const double chance = 2 * std::sqrt(kNominal * (1 - kNominal) * all);
+    return inside >= kLeastHeld * all - chance && inside <= kMostHeld * all + chance;
   }
 };
 
