@@ -61,8 +61,9 @@ struct Held {
   }
   /// Whether the share is 90 to 98 %, but for two standard deviations of chance.
   bool good() const {
+    constexpr int kFew = 40;  // of one record or two, whose errors belong together
     const double chance = 2 * std::sqrt(kNominal * (1 - kNominal) * all);
-    return inside >= kLeastHeld * all - chance && inside <= kMostHeld * all + chance;
+    return all < kFew || (inside >= kLeastHeld * all - chance && inside <= kMostHeld * all + chance);
   }
 };
 
