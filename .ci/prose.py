@@ -34,8 +34,9 @@ EXCEPTIONS = re.compile(
     r"|^CONTRIBUTING\.md:\d+: \|"
     r"|reaction is no force")
 MARKS = r'(?:\s*\n[\s/*!<#"]*|\s+)'  # between the lines of one passage
-C_SOURCE = re.compile(r"""//(?P<line>.*)|/\*(?P<block>.*?)\*/|R"(?P<mark>\w*)\((?P<raw>.*?)\)(?P=mark)"
-                      |"(?P<text>(?:[^"\\\n]|\\.)*)"|'(?:[^'\\\n]|\\.)*'|`(?P<template>[^`]*)`""",
+C_SOURCE = re.compile(r"""//(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/
+                      |R"(?P<mark>\w*)\((?P<raw>.*?)\)(?P=mark)"|"(?P<text>(?:[^"\\\n]|\\.)*)"
+                      |'(?:[^'\\\n]|\\.)*'|`(?P<template>[^`]*)`""",
                       re.VERBOSE | re.DOTALL)
 
 
