@@ -5,9 +5,9 @@ namespace dashpot::analysis {
 
 struct SampledLoop;
 
-/// What a sampled loop leaves of the damping that is wanted.
+/// The part of the wanted damping that a sampled loop tolerates.
 struct DampingLevel {
-  double level = 1;  ///< share of it that the mode keeps that keeps least, above 0 and at most 1
+  double level = 1;  ///< smallest share that a mode keeps, above 0 and at most 1
   bool kept = true;  ///< every mode keeps the gain margin
 
   void include(const DampingLevel& other) noexcept {
@@ -16,35 +16,35 @@ struct DampingLevel {
   }
 };
 
-/// The damping that one mode bears in a sampled loop, in constant time.
+/// The damping that one mode tolerates in a sampled loop, computed in constant time.
 ///
-/// A mode y'' + d y' + omega^2 y = 0 whose spring and damper act through a computer, as sample_loop
-/// says (without friction, gravity and memory), is at the boundary of stability where
+/// The mode is y'' + d y' + omega^2 y = 0. Its spring and damper act through a computer as in
+/// sample_loop, without friction, gravity and memory. It is at the boundary of stability where
 ///     1 + k P(z) + c V(z) = 0,    k = (omega T)^2,  c = d T,  z = e^(i theta),
 ///     P = z^-delay a / (1 - (1 - a) / z) (z + 1) / (2 (z - 1)^2),    a = 1 - exp(-2 pi f_c T),
 ///     V = 2 (z - 1) / (z + 1) P, or (1 - 1 / z) P if the velocity is differenced.
-/// Its real and imaginary part give k and c for each theta. From k = c = 0 the boundary runs along
-/// the least damping that a stiffness needs up to the largest stiffness that any damping bears, and
-/// from there along the most damping that a stiffness bears back to k = 0. Between them the loop is
-/// stable. The mode has a gain margin of m where (m k, m c) is between them, too.
+/// The real and imaginary part give k and c for each theta. From k = c = 0 the boundary follows the
+/// least damping that a stiffness needs, up to the largest stiffness that is stable with any
+/// damping. It returns to k = 0 along the most damping that a stiffness tolerates. The loop is
+/// stable between the two branches. The mode has a gain margin of m if (m k, m c) is between them.
 ///
 /// With proportional damping the loop has no other modes than these, one for each undamped mode.
 class BorneDamping {
  public:
-  /// Bears any damping.
+  /// Tolerates any damping.
   BorneDamping() = default;
   /// For modes that are to keep a gain margin, above 1. Throws std::invalid_argument for a loop
   /// that sample_loop refuses, and for another margin.
   BorneDamping(const SampledLoop& loop, double gain_margin);
 
   /// Returns the share, above 0 and at most 1, of the damping `wanted` (1/s) with which a mode of
-  /// frequency `omega` (rad/s) keeps the margin. Where no share keeps it, because the spring alone
-  /// is too much for the loop, or what is wanted too little for the spring, it is the share with
-  /// the largest margin. `worst` then says so, and keeps the least share it has met.
+  /// frequency `omega` (rad/s) keeps the margin. If no share keeps it, because the spring alone is
+  /// too stiff for the loop or `wanted` is too small for the spring, returns the share with the
+  /// largest margin. `worst` records this, and the smallest share so far.
   ///
-  /// `in_force`, above 0 and at most 1, is the share of this mode where springs replace each other
-  /// gradually: omega^2 and `wanted` then count as that share of a whole, so that together they
-  /// bear no more than one.
+  /// `in_force`, above 0 and at most 1, is the share of this mode while springs replace each other
+  /// gradually. omega^2 and `wanted` then count as this share of a whole mode, so that all the
+  /// springs together tolerate no more than one mode does.
   ///
   /// Shares are up to a few percent less than the largest that keeps the margin, because the
   /// boundary is interpolated between kCells + 1 points, inside of it.
@@ -67,9 +67,9 @@ class BorneDamping {
   static constexpr int kCells = 64;
 
  private:
-  using Table = std::array<double, kCells + 1>;  // over k from 0 to the largest that is borne
+  using Table = std::array<double, kCells + 1>;  // over k from 0 to the largest stable one
 
-  double period_ = 0, square_ = 0;  // T and its square; 0: any damping is borne
+  double period_ = 0, square_ = 0;  // T and its square; 0: any damping is allowed
   double cells_per_k_ = 0;
   double steepest_ = 0;     // c / k of the largest margin beyond the table
   Table most_{}, least_{};  // c

@@ -13,10 +13,10 @@ struct DampingMiss {
   /// Why the mode misses its ratio, as far as the reason is known.
   enum class Reason {
     kSoft,       ///< slower than the target's soft frequency: next to a singularity
-    kOverdone,   ///< the damping given already damps some direction more than is wanted
-    kStructure,  ///< no matrix of the structure asked for was found that gives the ratio
-    kCoupling,   ///< the damping given already couples modes, and no exact matrix was found
-    kLoop,       ///< period and delay of the loop do not bear more (damping_sampled.hpp)
+    kOverdone,   ///< the given damping damps some direction more than is wanted
+    kStructure,  ///< no matrix of the requested structure was found that gives the ratio
+    kCoupling,   ///< the given damping couples modes, and no exact matrix was found
+    kLoop,       ///< period and delay of the loop allow no more (damping_sampled.hpp)
   };
   int mode = 0;                  ///< index in the spectrum
   double natural_frequency = 0;  ///< rad/s
@@ -30,16 +30,16 @@ const char* to_text(DampingMiss::Reason reason) noexcept;
 
 /// A damping matrix, which is always positive semidefinite, and what it does.
 struct DampingDesign {
-  /// C_C, m x m, where the stiffness is given in task space; C, n x n, where the stiffness is given
-  /// in joint space only. It is added to the damping given already.
+  /// C_C, m x m, if the stiffness is given in task space; C, n x n, if the stiffness is given in
+  /// joint space only. It is added to the given damping.
   Eigen::MatrixXd damping;
   System<> system;      ///< with all damping
   Spectrum<> spectrum;  ///< of `system`
-  /// Empty if every mode has its ratio to 1e-9, or to the proved bound of its computed ratio where
-  /// the bound is larger.
+  /// Empty if every mode has its ratio to 1e-9, or to the proved bound of its computed ratio if the
+  /// bound is larger.
   std::vector<DampingMiss> misses;
-  /// Where misses are kOverdone: the most negative eigenvalue (1/s, mass-normalised modal
-  /// coordinates) of the exact answer, which therefore is no damping matrix; zero otherwise.
+  /// If misses are kOverdone: the most negative eigenvalue (1/s, mass-normalised modal coordinates)
+  /// of the exact answer, which therefore cannot serve as a damping matrix; zero otherwise.
   double indefinite_by = 0;
 };
 
@@ -55,7 +55,7 @@ struct DampingDesign {
 /// Without D this is exact. With a D that couples the zero modes, or with a joint stiffness in
 /// addition to K_C, it is the start of a Newton iteration to the exact answer.
 ///
-/// Where T is not positive semidefinite, no PSD matrix decouples the modes with these ratios. T is
+/// If T is not positive semidefinite, no PSD matrix decouples the modes with these ratios. T is
 /// then replaced by the PSD matrix nearest to it in the Frobenius norm: of all PSD matrices, the
 /// result is the one whose total damping is nearest to the wanted damping in mass-normalised modal
 /// coordinates. `misses` says by how much each mode misses.

@@ -68,26 +68,26 @@ struct RegionDesign {
 /// configuration has at least `level` times its target ratio and none exceeds the ceiling.
 ///
 /// The level is found by bisection to 5e-4 with DampingFit. The searches start from the exact
-/// designs of some configurations, from their mean, and from the best matrices found so far. This
-/// is no proof of the largest level. With a single configuration it is the largest smallest ratio
-/// within a structure and bounds.
+/// designs of some configurations, from their mean, and from the best matrices found so far. The
+/// search does not prove that the level is the largest. For a single configuration it maximises the
+/// smallest ratio within a structure and bounds.
 ///
-/// A few configurations bind, and those alone are searched over: 32 at first, spread evenly, joined
-/// by those that come off worst with what was found, until no configuration misses its level by
-/// more than 2e-4 or exceeds the ceiling. All are evaluated with the matrix that is returned.
+/// Only the few configurations that bind are searched over: 32 at first, spread evenly. The worst
+/// ones with each result join them, until no configuration misses its level by more than 2e-4 or
+/// exceeds the ceiling. All are evaluated with the matrix that is returned.
 ///
-/// With RegionOptions::loop the matrix found so is lowered as a whole, by the largest `share` in
-/// (0, 1] with which the sampled loop of every configuration keeps the gain margin. The share is
-/// sought as analysis::design_damping seeks the level of one configuration. What is lowered is the
-/// matrix, because to search it anew at each level would take that many times as long. All motions
-/// count in a margin, soft ones too.
+/// With RegionOptions::loop this matrix is lowered as a whole, by the largest `share` in (0, 1]
+/// with which the sampled loop of every configuration keeps the gain margin. The share is sought as
+/// analysis::design_damping seeks the level of one configuration. The matrix is scaled down,
+/// because a search at each level would take many times as long. All motions count in a margin,
+/// soft ones too.
 ///
 /// Throws InvalidSystem for a configuration as damping_sample does (the configuration is not
 /// named), std::invalid_argument for invalid options, and like gain_margin for invalid loops.
 RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
                            const RegionOptions& options);
 
-/// What is asked about one damping matrix: which configurations does it treat worst?
+/// A question about one damping matrix: which configurations does it treat worst?
 struct RegionQuestion {
   Eigen::MatrixXd damping;
   DampingTarget target;
@@ -122,9 +122,9 @@ RegionVerdict judge_region(const std::vector<TaskImpedance>& configurations, std
                            const RegionQuestion& question,
                            const std::function<SampledLoop(std::size_t)>& loop = {});
 
-/// Configurations that lie elsewhere, such as in other processes.
+/// Configurations that are stored elsewhere, such as in other processes.
 struct RegionSource {
-  RegionSource() = default;  // so that a list of configurations is none of these
+  RegionSource() = default;  // so that no list of configurations converts to a source
   std::size_t count = 0;
   /// Returns one configuration; called for the few that are searched over.
   std::function<TaskImpedance(std::size_t)> configuration;
@@ -133,8 +133,8 @@ struct RegionSource {
   std::function<RegionVerdict(const RegionQuestion&)> judge;
 };
 
-/// As above, for configurations that are judged where they lie. The design is the same to the last
-/// bit, however they are divided; its `samples` are left empty.
+/// As above, for configurations that are judged where they are stored. The design is the same to
+/// the last bit, however they are divided; its `samples` are left empty.
 RegionDesign design_region(const RegionSource& source, const RegionOptions& options);
 
 /// Returns the map of the worst mode, and of the gain margins where RegionOptions::loop is given,

@@ -15,11 +15,11 @@ struct LoopLimit {
   double gain_margin = 2;  ///< least gain margin wanted, see analysis::gain_margin; not below 1
 };
 
-/// A damping matrix that a sampled loop can bear.
+/// A damping matrix with which a sampled loop keeps its gain margin.
 struct SampledDamping {
   /// The design for `level` times the target's ratios, the largest ratios found with which the loop
-  /// keeps its margin. Its misses are relative to the target as given. Where only the loop is to
-  /// blame, the reason is kLoop.
+  /// keeps its margin. Its misses are relative to the target as given. The reason is kLoop if only
+  /// the loop prevents the ratio.
   DampingDesign design;
   double level = 1;         ///< in (0, 1]
   double gain_margin = 0;   ///< with the design, see analysis::gain_margin

@@ -9,9 +9,9 @@ namespace dashpot::analysis {
 ///
 ///     p'' + D p' + [R R' 0; 0 0] p = 0.
 ///
-/// With M = L L' and L^-1 W' = Q [R; 0], the coordinates are L^-T Q. Where W has more rows than
-/// columns, W L^-T = Q R' takes the place of that, and there are no zero modes. No eigenvectors are
-/// needed for it, so that it is much cheaper than ZeroModes.
+/// With M = L L' and L^-1 W' = Q [R; 0], the coordinates are L^-T Q. If W has more rows than
+/// columns, W L^-T = Q R' replaces this, and there are no zero modes. The form needs no
+/// eigenvectors, so that it is much cheaper than ZeroModes.
 template <int N = kDynamic>
 struct ElasticForm {
   Square<N> coordinates;  ///< n x n
@@ -33,9 +33,8 @@ template <int N>
 Status to_elastic_form(const System<N>& system, ElasticForm<N>& out) noexcept;
 
 /// Computes the eigenvalues alone, without vectors and without proved bounds: 2 m of the modes, and
-/// those of the zero modes' velocities unless they are free, which makes m + n. The errors are
-/// about eps times the largest eigenvalue. The status is kOk or kNotConverged. Allocates nothing
-/// for a fixed N.
+/// n - m of the zero modes' velocities unless these are free. The errors are about eps times the
+/// largest eigenvalue. The status is kOk or kNotConverged. Allocates nothing for a fixed N.
 template <int N>
 Status elastic_eigenvalues(
     const ElasticForm<N>& form,

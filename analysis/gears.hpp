@@ -10,15 +10,15 @@ struct PassivePart {
   Square<kMaxDof> stiffness, damping;
 };
 
-/// Gears that bend, in the closed loop of an arm. Between the motor and the link of an elastic
-/// joint sits a spring K_J with a damper D_J, and the motor's reflected inertia B is a body of its
-/// own (Spong 1987):
+/// Elastic joints in the closed loop of an arm. A spring K_J with a damper D_J connects the motor
+/// and the link of an elastic joint, and the motor's reflected inertia B is a body of its own
+/// (Spong 1987):
 ///     (M - B) q'' + ... = tau_J,   B theta'' + F theta' = u - tau_J,
 ///     tau_J = K_J (theta - q) + D_J (theta' - q').
 /// The coordinates are x = (q, theta): n links, then the motors of the m elastic joints. The torque
 /// u of the controller acts on the motors, the world on the links, and the springs and dampers of
-/// the controller act on what the position sensor sees: K_c of the loop without elastic joints
-/// becomes, where all joints are elastic,
+/// the controller act on the coordinate that the position sensor measures. If all joints are
+/// elastic, K_c of the loop without elastic joints becomes
 ///     motor: [K_J, -K_J; -K_J, K_J + K_c],   link: [K_J, -K_J; K_c - K_J, K_J],
 /// which is not symmetric, and can be unstable; the dampers likewise.
 class Gears {
@@ -43,8 +43,8 @@ class Gears {
   /// Returns the joints, from 0, whose motors have the coordinates n, n + 1, ...
   const std::vector<int>& joints() const noexcept { return joints_; }
 
-  /// Makes the loop with elastic joints of one in joint coordinates: mass, damping, stiffness, and
-  /// the factor, which only springs on the motors' side have. `passive` is the world's part of it.
+  /// Makes the loop with elastic joints from a loop in joint coordinates: mass, damping, stiffness,
+  /// and the factor, which only springs on the motors' side have. `passive` is the world's part.
   /// Bounds of a spectrum hold for the coefficients as they are rounded here.
   template <int N>
   void extend(const PassivePart& passive, System<N>& system) const noexcept;

@@ -6,16 +6,16 @@
 
 namespace dashpot::analysis {
 
-/// Kind of a mode. The proved bounds decide it, or the computed numbers alone where no bound could
-/// be proved.
+/// Kind of a mode. The proved bounds decide it, or the computed numbers alone if no bound could be
+/// proved.
 enum class ModeKind {
   kUnderdamped,  ///< a complex pair, 0 < zeta < 1
   kCritical,     ///< a double real eigenvalue, as far as the error bound can tell
   kOverdamped,   ///< two real eigenvalues
   kUndamped,     ///< a purely imaginary pair, as far as the error bound can tell
   kUnstable,     ///< an eigenvalue with positive real part, beyond its error bound
-  kSoft,         ///< below SpectrumOptions::soft_frequency, or no frequency because an eigenvalue
-                 ///< cannot be told from zero: its damping ratio means nothing
+  kSoft,         ///< below SpectrumOptions::soft_frequency, or without a frequency because an
+                 ///< eigenvalue may be zero: its damping ratio means nothing
   kAlternating,  ///< of a sampled loop: it changes its sign with every tick
 };
 

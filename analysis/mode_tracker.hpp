@@ -77,7 +77,7 @@ class ModeTracker {
   const TrackerCounters& counters() const noexcept { return counters_; }
 
  private:
-  /// What the basis serves for.
+  /// Use of the basis.
   enum class State {
     kEmpty,      ///< there is none
     kMatching,   ///< its columns say which mode has which index
@@ -85,7 +85,6 @@ class ModeTracker {
     kCurrent,    ///< and it is the solution for last_, as E_ and enclosure_ are
   };
 
-  /// Says what becomes of a basis before its next step.
   enum class Verdict { kImprove, kPublish, kGiveUp };
 
   bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;

@@ -21,8 +21,8 @@ using TaskJacobian =
 /// Computes the damping matrix with which every mode of an impedance-controlled arm keeps its
 /// target ratio, in the control loop. For mass M (n x n), and k springs of stiffness K = F F' whose
 /// deflections have the Jacobian J (k x n), it is the one C (k x k) in the range of K with which
-/// M q'' + J' C J q' + J' K J q = 0  has the damping ratios of the target. The springs are those of
-/// the task (K_C, C_C, k = 6), or of the joints (k = n, J the identity); n and k are at most 16.
+/// M q'' + J' C J q' + J' K J q = 0  has the damping ratios of the target. The springs act in the
+/// task (K_C, C_C, k = 6), or in the joints (k = n, J the identity); n and k are at most 16.
 ///
 /// With M = L L' and the singular value decomposition F' J L^-T = U diag(omega) V',
 ///
@@ -40,12 +40,12 @@ using TaskJacobian =
 /// With viscous friction D = diag(d) in the joints, the damping by friction is subtracted:
 ///     C = F U R U' F',    R as in modal_damping.hpp.
 /// This is exact for as many joints as springs. The friction of a redundant arm couples vibrations
-/// with free motions as well, and the ratios are then right to first order in that coupling. Where
-/// friction is more than is wanted, C is a semidefinite matrix near the exact one, and `overdone`
-/// says so. Its bound is larger than the bound without friction by a factor of a few.
+/// with free motions as well, and the ratios are then right to first order in that coupling. If
+/// friction exceeds the wanted damping, C is a semidefinite matrix near the exact one, and
+/// `overdone` is true. Its bound is larger than the bound without friction by a factor of a few.
 ///
 /// For a sampled loop (`set_loop`) each mode gets the share of its damping 2 zeta omega that the
-/// loop bears, see BorneDamping. C is then continuous, with kinks where the share leaves 1.
+/// loop tolerates, see BorneDamping. C is then continuous, with kinks where the share leaves 1.
 ///
 /// For fewer task directions, leave rows of J and K_C zero. Nothing here allocates or throws (as
 /// long as matrices, not expressions, are passed), and the work is bounded. Each step starts from
@@ -62,8 +62,8 @@ class RatioDamping {
   /// Sets d, n, N m s/rad, not negative; without entries: none.
   void set_friction(const Vector<kMaxDof>& friction) noexcept { friction_ = friction; }
 
-  /// Sets what the loop bears, which has to outlive this; null: any damping. Of springs that are
-  /// in force in part it takes their share, above 0 and at most 1.
+  /// Sets the damping that the loop tolerates; the object has to outlive this; null: any damping.
+  /// `in_force`, above 0 and at most 1, is the share of springs that are only partly active.
   void set_loop(const BorneDamping* borne, double in_force = 1) noexcept {
     borne_ = borne;
     in_force_ = in_force;
@@ -82,7 +82,7 @@ class RatioDamping {
 
   /// True if friction was too much for the target at the last good update.
   bool overdone() const noexcept { return overdone_; }
-  /// What the loop left of the target at the last good update.
+  /// The part of the target that the loop tolerated at the last good update.
   const DampingLevel& level() const noexcept { return level_; }
 
  private:

@@ -61,7 +61,7 @@ class Response {
                               const std::vector<double>& times) const;
 
   /// Returns the receptance  H(omega) = (K + i omega C - omega^2 M)^-1, n x n, by modal
-  /// superposition. Where i omega is an eigenvalue exactly, the entries that this mode reaches are
+  /// superposition. If i omega is an eigenvalue exactly, the entries that this mode reaches are
   /// infinite.
   Eigen::MatrixXcd receptance(double omega) const;
 
@@ -88,7 +88,7 @@ class Response {
 /// terms q_i' K q_k + v_i' M v_k, which vanish where the undamped modes decouple the damping.
 struct ModeShares {
   Eigen::VectorXd energy;  ///< m; NaN if nothing moves. Within [0, 1] unless K is indefinite
-  double zero_modes = 0;   ///< share of the drift along zero modes, without that of a step
+  double zero_modes = 0;   ///< share of the drift along zero modes, without the drift of a step
   /// (energy of the whole motion - sum of all E) / (sum of all E)
   double cross = 0;
   /// Largest |p_k| of each point's coordinate k and mode in t >= 0, in the motion p = J q_i(t) of

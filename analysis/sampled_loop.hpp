@@ -19,13 +19,13 @@ namespace dashpot::analysis {
 /// t and the damping ratio falls by (1 - 2 zeta^2) omega t / 2, with t = (d + 1/2) T plus the lag
 /// of the filter.
 ///
-/// `spectrum` has to be the spectrum of `system`; with gears it is not read, and the modes are
-/// those of the system that SampledLoop::gears make of it. Each of its modes gets the z nearest to
-/// its eigenvalues, moved by the loop's delays to first order, nearest pairs first. That is
-/// meaningful while omega T stays well below 1.
+/// `spectrum` has to be the spectrum of `system`; with gears it is not read, and the modes belong
+/// to the system that SampledLoop::gears make of it. Each of its modes gets the z nearest to its
+/// eigenvalues, moved by the loop's delays to first order, nearest pairs first. That is meaningful
+/// while omega T stays well below 1.
 ///
-/// Call it at a lower rate than the tick's, because it allocates, and solves one dense eigenproblem
-/// of up to (4 + d) n + m rows; where all springs and dampers of the controller act in fewer than n
+/// Call it less often than every tick, because it allocates, and solves one dense eigenproblem of
+/// up to (4 + d) n + m rows; if all springs and dampers of the controller act in fewer than n
 /// directions, a delay and the filter have only so many rows each. Throws std::invalid_argument for
 /// matrices of other sizes or entries that are not finite, a period that is not positive, a
 /// negative delay or cutoff, and a spectrum without modes because of its status. Throws
@@ -36,18 +36,18 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 
 /// Returns the factor by which the controller's K - P and C - D and what SampledLoop::memory puts
 /// out may grow together before the loop becomes unstable, to six digits. It is the first boundary
-/// above 1, searched in steps of a quarter, or infinity if there is none up to `most`. Where the
-/// loop is unstable as it is, the result is the first boundary below 1, or zero if there is none
-/// down to 1e-3. Motions with |log z| / T below SampledLoop::slowest do not count; where the state
-/// has more than 100 rows, in sample_loop's fewer ones for a delay and a filter, that is at least
-/// 1e-6 / T. The search takes ten to some tens of eigenproblems, or, with more than 100 rows,
-/// of counts whose work does not grow with the delay. Throws like sample_loop.
+/// above 1, searched in steps of a quarter, or infinity if there is none up to `most`. If the loop
+/// is unstable as it is, the result is the first boundary below 1, or zero if there is none down to
+/// 1e-3. Motions with |log z| / T below SampledLoop::slowest do not count; where the state has more
+/// than 100 rows, in sample_loop's fewer ones for a delay and a filter, that is at least 1e-6 / T.
+/// The search takes ten to some tens of eigenproblems, or, with more than 100 rows, of counts whose
+/// work does not grow with the delay. Throws like sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most = 1e6);
 
 /// Returns whether gain_margin is at least `margin`, from the few factors that its search would try
-/// up to there; of a margin below 1 this is whether the loop is stable with it or as it is. Throws
+/// up to there; for a margin below 1, whether the loop is stable with it or as it is. Throws
 /// likewise, and for a negative margin.
 bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
                   double margin);

@@ -11,8 +11,8 @@ namespace dashpot::analysis {
 /// symmetric.
 struct TrackedShapes {
   /// u in joint coordinates, n each, u^H M u = 1, largest entry real and positive. At critical
-  /// damping both are the only eigenvector. Zero where an eigenvalue is exactly zero, which is the
-  /// eigenvalue of an elastic coordinate that no motion changes.
+  /// damping both are the only eigenvector. Zero if the eigenvalue is exactly zero: it belongs to
+  /// an elastic coordinate that no motion changes.
   std::array<ComplexVector<kMaxDof>, 2> u;
   /// u' (2 lambda M + C) u (no conjugation), 1/s: the scale of dual vectors and of sensitivities;
   /// zero at critical damping, and where coefficients are not symmetric
@@ -20,8 +20,8 @@ struct TrackedShapes {
 };
 
 struct TrackedSpectrum {
-  /// kUncertified: some error_bound is infinite. The bounds of a mode's frequency and ratio are
-  /// infinite without that where an eigenvalue cannot be told from zero.
+  /// kUncertified: some error_bound is infinite. With kOk too, the bounds of a mode's frequency and
+  /// ratio are infinite if an eigenvalue may be zero.
   Status status = Status::kNotConverged;
   SpectrumOrigin origin = SpectrumOrigin::kDirect;
   int mode_count = 0;

@@ -9,7 +9,6 @@
 namespace dashpot::analysis {
 namespace {
 
-/// The boundary of stability, see BorneDamping.
 class Boundary {
  public:
   struct Point {
@@ -39,7 +38,7 @@ class Boundary {
   /// The point of the largest stiffness.
   Point tip() const { return at(tip_); }
   /// The least and the most damping for a stiffness. If k does not return to 0 before theta = pi,
-  /// the most damping is that of z = -1 for every k.
+  /// z = -1 limits the damping for every k.
   double least(double k) const { return at(where(k, 0, tip_)).c; }
   double most(double k) const { return at(tip_ < end_ ? where(k, end_, tip_) : end_).c; }
 
@@ -53,7 +52,7 @@ class Boundary {
     return 0.5 * (less + more);
   }
 
-  /// Where k is 0 again, or nearly pi if that is nowhere.
+  /// The theta at which k is 0 again, or nearly pi if there is none.
   double find_end() const {
     constexpr double kStep = 1.01, kLast = std::numbers::pi - 1e-6;
     for (double theta = 1e-6; theta < kLast; theta *= kStep) {
@@ -62,7 +61,7 @@ class Boundary {
     return kLast;
   }
 
-  /// Where k is largest, by golden section: it rises, and then falls.
+  /// The theta with the largest k, by golden section: k rises, and then falls.
   double find_tip() const {
     constexpr double kGolden = 0.6180339887498949;
     double low = 0, high = end_;

@@ -182,8 +182,8 @@ void raise_smallest_ratio(const TaskImpedance& impedance, const DampingTarget& t
   }
 }
 
-/// Replaces a design that a search from `start` found, and that misses its target, by a better one
-/// from farther on the way to `exact`: a search can get stuck where modes coincide.
+/// Replaces a design of a search from `start` that misses its target by a better one. Its search
+/// starts nearer to `exact`, because a search can get stuck where modes coincide.
 void search_farther_away(const MatrixXd& start, const MatrixXd& exact,
                          const std::function<DampingDesign(const MatrixXd&)>& search,
                          DampingDesign& design) {
@@ -308,7 +308,7 @@ DampingDesign design_damping(const TaskImpedance& impedance, const DampingTarget
     raise_smallest_ratio(impedance, target, fit, from, design);
   }
   for (DampingMiss& miss : design.misses) {
-    if (structure == DampingStructure::kFull) break;  // which is none
+    if (structure == DampingStructure::kFull) break;  // no constraint
     if (miss.reason != DampingMiss::Reason::kSoft) miss.reason = DampingMiss::Reason::kStructure;
   }
   return design;

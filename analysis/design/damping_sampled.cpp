@@ -13,7 +13,7 @@ DampingTarget scaled(DampingTarget target, double level) {
   return target;
 }
 
-/// The misses of `target` by a design whose own target was lower, for the loop's sake.
+/// The misses of `target` by a design whose own target was lowered for the loop.
 std::vector<DampingMiss> misses_of(const DampingDesign& design, const DampingTarget& target) {
   std::vector<DampingMiss> misses =
       find_misses(design.spectrum, target, DampingMiss::Reason::kLoop);
@@ -30,7 +30,7 @@ std::vector<DampingMiss> misses_of(const DampingDesign& design, const DampingTar
 SampledDamping design_damping(const TaskImpedance& impedance, const DampingTarget& target,
                               const LoopLimit& limit, DampingStructure structure,
                               const std::optional<Eigen::MatrixXd>& start) {
-  require("damping", limit.gain_margin >= 1, "a gain margin below 1 is none");
+  require("damping", limit.gain_margin >= 1, "the gain margin has to be at least 1");
   double last_level = 0;
   DampingDesign last;
   const auto at = [&](double level) -> const DampingDesign& {

@@ -8,11 +8,11 @@ namespace {
 
 constexpr double kGridStep = 2. / 3;
 constexpr double kLowestLevel = 1e-3;
-/// A level is found from below, this precisely.
+/// Relative precision of a level, which is approached from below.
 constexpr double kLevelPrecision = 1e-6;
 /// The peak of a margin below this part of the one wanted is found less precisely.
 constexpr double kReach = 0.8, kCoarse = 3e-3;
-/// gain_margin finds none below.
+/// gain_margin finds no margin below this.
 constexpr double kLeastQuestion = 1e-3;
 
 /// The level with the largest margin that is found, or one that keeps the margin wanted.

@@ -3,8 +3,8 @@
 
 namespace dashpot::analysis {
 
-/// A gain margin has this relative error: its search may have other brackets than the question
-/// whether it is kept.
+/// A gain margin has this relative error: its search and the test whether it is kept may use
+/// different brackets.
 inline constexpr double kMarginPrecision = 1e-6;
 
 /// A share of the damping wanted, and whether a loop keeps its margin with it.
@@ -17,12 +17,12 @@ struct FoundLevel {
 /// falls by a third from 1 to 1e-3, and to 1e-6 of itself by bisection above the first grid point
 /// that keeps the margin. If no grid point keeps it, the level with the largest margin is sought by
 /// golden section, as if the margin rose and then fell with the level: to 1e-6 of itself if the
-/// margin found comes to 0.8 of the one wanted, otherwise to 3e-3. If that does not keep the margin
-/// either, it is the level found.
+/// margin found comes to 0.8 of the one wanted, otherwise to 3e-3. If this level does not keep the
+/// margin either, it is returned.
 ///
-/// keeps(level, m) says whether the margin there is at least m; margin(level) is it. That is asked
-/// for only where no grid point keeps the margin, and there of level 1 and of levels that are as
-/// good as the best before: the others are told by one question.
+/// keeps(level, m) is true if the margin at a level is at least m; margin(level) is the margin.
+/// margin is called only if no grid point keeps the margin: for level 1, and for levels as good as
+/// the best before. One call of keeps rejects the others.
 FoundLevel find_level(const std::function<bool(double, double)>& keeps,
                       const std::function<double(double)>& margin, double wanted);
 

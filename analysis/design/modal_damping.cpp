@@ -45,8 +45,8 @@ bool make_semidefinite(Matrix& T) noexcept {
 
 namespace {
 
-/// How much of a mode's coupling counts: all of it unless what is there damps the mode more than is
-/// wanted; then less, and twice continuously differentiable down to 0 with the share x of the two.
+/// The share of a mode's coupling that counts: 1 unless the present damping exceeds the wanted one;
+/// then it falls to 0 with wanted / present, twice continuously differentiable.
 double coupling_share(double wanted, double there) noexcept {
   if (!(there > wanted)) return 1;
   const double rest = 1 - wanted / there;

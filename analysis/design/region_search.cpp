@@ -35,7 +35,7 @@ std::vector<DampingSample> samples_of(const std::vector<TaskImpedance>& configur
 
 /// Returns the largest ratio allowed. Throws for options that are not valid.
 double ceiling_of(const RegionOptions& options) {
-  require("damping", options.gain_margin >= 1, "a gain margin below 1 is none");
+  require("damping", options.gain_margin >= 1, "the gain margin has to be at least 1");
   const double wanted = std::max(options.target.low_ratio, options.target.high_ratio);
   const double ceiling = options.ceiling.value_or(std::max(1.0, 1.5 * wanted));
   require("damping", ceiling >= wanted, "the largest ratio allowed is below the one wanted");
@@ -141,8 +141,8 @@ Candidate search_level(const std::vector<TaskImpedance>& configurations, const M
   return best;
 }
 
-/// Seeks the largest share of `damping` with which every loop keeps its margin. At each share those
-/// are asked first that have lost it at another.
+/// Seeks the largest share of `damping` with which every loop keeps its margin. Loops that lost the
+/// margin at one share are asked first at the next.
 FoundLevel find_share(const RegionSource& source, const MatrixXd& damping,
                       const RegionOptions& options, const std::function<void()>& tell) {
   std::vector<std::size_t> losing;
@@ -171,13 +171,13 @@ FoundLevel find_share(const RegionSource& source, const MatrixXd& damping,
   return find_level(keeps, margin_of, options.gain_margin);
 }
 
-/// A damping matrix, and which share it is of one for continuous loops.
+/// A damping matrix, and its share of the matrix for continuous loops.
 struct Lowered {
   MatrixXd damping;
   FoundLevel share;
 };
 
-/// The best matrix for continuous loops, and the share of it that sampled ones bear.
+/// The best matrix for continuous loops, and the share of it that sampled loops tolerate.
 Lowered search_region(const RegionSource& source, const RegionOptions& options) {
   const double ceiling = ceiling_of(options);
   require("damping", source.count > 0, "a region without configurations");
@@ -242,7 +242,6 @@ RegionDesign design_of(const Lowered& found, const RegionVerdict& verdict, const
   return design;
 }
 
-/// Returns what is asked last.
 RegionQuestion last_question(const MatrixXd& damping, const RegionOptions& options) {
   return {damping, options.target, 0, 0, {}, options.loop ? kMostMargin : 0};
 }

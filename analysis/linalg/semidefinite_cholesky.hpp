@@ -7,9 +7,9 @@
 namespace dashpot::analysis {
 
 /// Computes F (n x n, lower triangular) with K = F F' for a symmetric positive semidefinite K, of
-/// which the lower triangle is read. A pivot that cannot be told from zero ends its column; the
-/// rest of the column then has to be zero too. Returns false, with F incomplete, unless K is
-/// semidefinite to rounding.
+/// which the lower triangle is read. A pivot that is zero to rounding ends its column; the rest of
+/// the column then has to be zero too. Returns false, with F incomplete, unless K is semidefinite
+/// to rounding.
 template <class Symmetric, class Matrix>
 bool semidefinite_cholesky(const Symmetric& K, Matrix& F) noexcept {
   const Eigen::Index n = K.rows();

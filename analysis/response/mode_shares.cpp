@@ -49,7 +49,7 @@ double farthest(const Mode<>& mode, double p, double v) {
   return std::max(std::abs(p), std::abs(there));
 }
 
-/// The coordinates of the free motion: of a step, those about its rest.
+/// The coordinates of the free motion; after a step, about its rest.
 VectorXd free_coordinates(const System<>& system, const ModalBasis<>& basis, const Cause& cause) {
   const VectorXd zero = VectorXd::Zero(system.dof());
   VectorXd xi = coordinates<kDynamic>(basis, system.mass, system.damping,
@@ -71,7 +71,7 @@ VectorXd free_coordinates(const System<>& system, const ModalBasis<>& basis, con
 
 ModeShares mode_shares(const System<>& system, const Spectrum<>& spectrum, const Cause& cause,
                        const MatrixXd& points) {
-  Response(system, spectrum).caused(cause, 0);  // refuses what is no cause of this system
+  Response(system, spectrum).caused(cause, 0);  // throws if the cause does not fit the system
   const Index n = system.dof();
   require("mode_shares", points.cols() == n, "points has not as many columns as coordinates");
   const ModalBasis<>& basis = spectrum.basis;

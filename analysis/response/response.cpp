@@ -79,7 +79,7 @@ Response::Response(const System<>& system, const Spectrum<>& spectrum)
   require("Response", spectrum.status == Status::kOk || spectrum.status == Status::kUncertified,
           std::string("the spectrum holds no modes: ") + to_text(spectrum.status));
   require("Response", basis_.U.rows() == n && basis_.U.cols() == 2 * n,
-          "the spectrum is not that of a system with " + std::to_string(n) + " coordinates");
+          "the spectrum does not belong to a system with " + std::to_string(n) + " coordinates");
   velocity_basis_ = basis_.U * basis_.Lambda;
   const MatrixXd& zero_modes = spectrum.zero_modes.basis;
   zero_projector_ = zero_modes * (zero_modes.transpose() * mass_);

@@ -36,8 +36,8 @@ int block_of(const Mode<>& mode, const ModalBasis<>& basis, std::vector<bool>& t
   return best;
 }
 
-/// Whether the mode's eigenvalues are far enough from those of all others, and from each other
-/// unless a block holds both.
+/// Whether the mode's eigenvalues are far enough from the eigenvalues of all other modes, and from
+/// each other unless a block holds both.
 bool is_regular(const Mode<>& mode, const Spectrum<>& spectrum, bool has_block) {
   if (!std::isfinite(mode.natural_frequency)) return false;
   for (const Complex& value : mode.eigenvalues) {

@@ -96,7 +96,7 @@ class TouchedLoop {
 
   double period_, slowest_;
   SampledDataModel free_;
-  VectorXd a_;  ///< a' y T is what the touch is pressed in, y in the coordinates of free_
+  VectorXd a_;  ///< a' y T is the deflection of the touch, y in the coordinates of free_
 };
 
 /// The least damped motion of a trial.
@@ -193,8 +193,7 @@ void find_limit(const TouchedLoop& loop, const Touch& touch, ContactLimit& resul
   }
 }
 
-/// Sets the frequency of the motion that grows beyond a boundary, and interpolates where it begins
-/// to.
+/// Sets the frequency of the motion that grows beyond a boundary, and interpolates the boundary.
 void polish(const TouchedLoop& loop, ContactLimit& result) {
   constexpr double kAside = 1e-6;
   constexpr double kSame = 1e-3;  // distance of one eigenvalue on both sides

@@ -27,12 +27,12 @@ class ScaledLoop {
       counted_.emplace(loop, slowest);
       return;
     }
-    // Which they are is the same with every factor but zero.
+    // Motions that do not count are the same with every factor but zero.
     free_ = loop.on_other_motions(loop.transition(0));
     gain_ = loop.on_other_motions(loop.transition(1)) - free_;
     if (loop.rows() > 2 * loop.n) return;
     const MatrixXd V = loop.on_other_motions(energy(loop)), W = V * gain_;
-    if (!is_positive(V)) return;  // it is no energy
+    if (!is_positive(V)) return;  // not an energy
     lost_[0] = V - free_.transpose() * V * free_;
     lost_[0].diagonal().array() -= kRounding * V.trace();
     lost_[1] = free_.transpose() * W;
@@ -58,7 +58,7 @@ class ScaledLoop {
   double excess(double factor) const { return at(factor).excess; }
 
  private:
-  /// Cholesky's decomposition takes what is not a number for a success.
+  /// Cholesky's decomposition reports success for NaN.
   static bool is_positive(const MatrixXd& A) {
     return A.allFinite() && Eigen::LLT<MatrixXd>(A).info() == Eigen::Success;
   }
@@ -86,7 +86,7 @@ class ScaledLoop {
 
 bool keeps(const SampledDataModel& unit, double margin, double slowest) {
   const ScaledLoop loop(unit, slowest);
-  // Also where it is not stable with less: gain_margin begins at 1.
+  // Also if it is unstable with less: gain_margin begins at 1.
   if (margin < 1) return loop.excess(margin) < 0 || loop.excess(1) < 0;
   if (!(loop.excess(margin) < 0)) return false;
   for (double factor = 1; factor < margin; factor *= kFactorStep) {
@@ -137,7 +137,7 @@ double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double m
 
 bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
                   double margin) {
-  require("keeps_margin", margin >= 0, "a gain margin below 0 is none");
+  require("keeps_margin", margin >= 0, "the gain margin must not be negative");
   if (loop.gears.any()) {
     const GearedLoop geared(system, loop);
     return keeps_margin(geared.system, geared.spectrum, geared.loop, margin);

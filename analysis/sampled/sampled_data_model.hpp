@@ -7,8 +7,8 @@
 
 namespace dashpot::analysis {
 
-/// The loop in coordinates y = L' q (M = L L'), or in those of an elastic form, with ticks as the
-/// unit of time: mass 1, period 1.
+/// The loop in coordinates y = L' q (M = L L'), or in the coordinates of an elastic form, with
+/// ticks as the unit of time: mass 1, period 1.
 struct SampledDataModel {
   Eigen::Index n = 0;
   Eigen::MatrixXd C, K, D;  ///< n x n
@@ -21,9 +21,9 @@ struct SampledDataModel {
   double filter_gain = 1;  ///< 1: no filter
   bool difference = false;
   Eigen::MatrixXd motion;  ///< (y, y') after a tick from (y, y', torque), 2n x 3n
-  /// Orthonormal, n x r: all commands lie in its span but for what is less than the rounding errors
-  /// of A. They are delayed and filtered in these coordinates: of springs and dampers in 6
-  /// directions there are 6. The identity where nothing is delayed or filtered.
+  /// Orthonormal, n x r: all commands lie in its span to the rounding errors of A. They are delayed
+  /// and filtered in these coordinates: springs and dampers in 6 directions need 6. The identity if
+  /// nothing is delayed or filtered.
   Eigen::MatrixXd commands;
 
   /// Throws std::invalid_argument as sample_loop does.
@@ -39,8 +39,8 @@ struct SampledDataModel {
     return commands.cols() * (delay + (filtered() ? 1 : 0)) + (difference ? n : 0) +
            states.state.rows();
   }
-  /// Returns how many of discrete_eigenvalues(), the last ones, are those of the delay and filter
-  /// of commands that are always zero.
+  /// Returns how many of discrete_eigenvalues(), the last ones, belong to the delay and filter of
+  /// commands that are always zero.
   Eigen::Index idle() const { return (n - commands.cols()) * (delay + (filtered() ? 1 : 0)); }
   Eigen::Index rows() const { return 2 * n + memory(); }
   /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), u and f by their coordinates
@@ -55,8 +55,8 @@ struct SampledDataModel {
   Eigen::MatrixXd unit_motions() const;
   /// Returns A (rows() x rows()) on the orthogonal complement of unit_motions().
   Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A) const;
-  /// Returns all eigenvalues of A except those of unit_motions(), and those of a delay and a filter
-  /// of the n - r commands that are always zero. Throws std::runtime_error.
+  /// Returns all eigenvalues of A outside unit_motions(), then the eigenvalues of a delay and a
+  /// filter of the n - r commands that are always zero. Throws std::runtime_error.
   Eigen::VectorXcd discrete_eigenvalues() const;
 
  private:
@@ -65,14 +65,14 @@ struct SampledDataModel {
   /// Checks SampledLoop::memory, throws std::invalid_argument, and sets `states`, where
   /// q = coordinates y.
   void remember(const SampledLoop& loop, const Eigen::MatrixXd& coordinates);
-  /// Sets `motion` and `commands`. Zero modes in which gravity is not compensated are none.
+  /// Sets `motion` and `commands`. Drops zero modes in which gravity is not compensated.
   void integrate();
   /// Leaves the zero modes with a' y = 0, orthonormal.
   void touch_zero_modes(const Eigen::VectorXd& a);
   void span_commands();
 };
 
-/// A loop with gears in the coordinates of these.
+/// A loop with gears in the coordinates of its gears.
 struct GearedLoop {
   System<> system;
   Spectrum<> spectrum;

@@ -93,15 +93,15 @@ class Matcher {
 
 constexpr int kZeroMode = -1, kMemory = -2;
 
-/// What is looked for: the two eigenvalues of a mode, or one of a zero mode or of the controller's
-/// memory, per tick.
+/// The wanted eigenvalues: two of a mode, or one of a zero mode or of the controller's memory, per
+/// tick.
 struct Wanted {
   std::array<Complex, 2> lambda;
   int mode = kZeroMode;
   bool done = false;
 };
 
-/// Adds what the controller's memory does while all else is at rest, K y = -output w.
+/// Adds the motion of the controller's memory while all else is at rest, K y = -output w.
 void list_memory(const SampledDataModel& loop, std::vector<Wanted>& wanted) {
   const ControllerMemory& states = loop.states;
   if (states.state.rows() == 0 || loop.n == 0) return;

@@ -29,7 +29,8 @@ struct SampledLoop {
   /// the gradient of gravity. Empty: none.
   Eigen::MatrixXd gravity_gradient = {};
   /// H, n x n, N m/rad: what the controller commands against gravity, H q_k. Empty: G, at the
-  /// positions where gravity acts. Another one where it is measured, or acts, elsewhere.
+  /// positions where gravity acts. Differs from G if gravity does not act on the measured
+  /// positions.
   Eigen::MatrixXd compensation = {};
   /// P, n x n, N m/rad: the part of the stiffness K that the world supplies, such as the springs of
   /// a contact. Empty: none.
@@ -38,9 +39,9 @@ struct SampledLoop {
   /// Motions slower than this, rad/s, do not count in a gain margin. A self-motion that the
   /// compensation of gravity feeds through the hold and the delay grows that slowly.
   double slowest = 0;
-  /// Gears that bend. The system and all of the above are then those in joint coordinates, friction
-  /// is the gears' and acts on the motors' side, and the modes are those of Gears::extend. An
-  /// elastic form with gears has to have been extended already, see with_gears.
+  /// Elastic joints. The system and all of the above are then in joint coordinates, friction
+  /// belongs to the gears and acts on the motors' side, and the modes belong to the system of
+  /// Gears::extend. An elastic form with gears has to have been extended already, see with_gears.
   Gears gears = {};
 };
 
@@ -49,9 +50,8 @@ struct SampledLoop {
 /// Returns the loop as it is if it has none.
 SampledLoop with_gears(const SampledLoop& loop);
 
-/// A mode of the loop that is closed once a tick. One with a z that is real and negative
-/// alternates: its frequency and ratio are those of the larger such z alone, with an imaginary part
-/// of pi / T.
+/// A mode of the loop that is closed once a tick. A mode with a real and negative z alternates: its
+/// frequency and ratio follow from the larger such z alone, with an imaginary part of pi / T.
 struct SampledMode {
   std::array<Complex, 2> discrete_eigenvalues{};  ///< z: a complex pair or two real ones
   std::array<Complex, 2> eigenvalues{};  ///< log(z) / T, 1/s: a complex pair, or of two real z
@@ -64,12 +64,12 @@ struct SampledMode {
 struct SampledSpectrum {
   std::vector<SampledMode> modes;   ///< with the indices of the continuous modes they come from
   std::vector<Complex> zero_modes;  ///< z of the velocities along the zero modes that are damped
-  std::vector<Complex> memory;  ///< z of the m states of SampledLoop::memory, nearest to those of
-                                ///< state - position K^-1 output, the motion at rest; one more
-                                ///< where a pair would be torn
+  std::vector<Complex> memory;  ///< z of the m states of SampledLoop::memory, nearest to the
+                                ///< eigenvalues of state - position K^-1 output, the motion at
+                                ///< rest; one more if a pair would be torn
   std::vector<Complex> others;  ///< z of the loop's own memory: delay, filter, last position
-  /// Largest |z| except for z = 1 of the zero modes: of their positions, and of the velocities
-  /// along them that nothing damps. The loop is stable if it is below 1.
+  /// Largest |z| except for z = 1 of the zero modes: of their positions, and of their undamped
+  /// velocities. The loop is stable if it is below 1.
   double spectral_radius = 0;
 
   bool stable() const noexcept { return spectral_radius < 1; }

@@ -47,9 +47,8 @@ void sort(ComplexStateVector<N>& values) {
 
 }  // namespace
 
-/// Replaces the slow ones of the eigenvalues of A, of which rounding errors of the fast ones leave
-/// nothing, by those of its inverse [-w^-1 D w^-1  -w^-1; w^-1  0], if A is symmetric but for
-/// signs.
+/// Replaces slow eigenvalues of A that drown in rounding errors of the fast ones. The inverse
+/// [-w^-1 D w^-1  -w^-1; w^-1  0] gives them, if A is symmetric but for signs.
 template <int N>
 bool CoreEigenvalues<N>::replace_slow(ComplexStateVector<N>& values, Work& work) noexcept {
   constexpr double kWide =
@@ -159,8 +158,8 @@ Square<N> CoreEigenvalues<N>::unsprung() const noexcept {
   return directions;
 }
 
-/// Marks the real eigenvalues whose motion is mostly that of a coupled zero mode. Rates
-/// that are zero to rounding become zero, so that they share a cluster, whose width is relative.
+/// Marks the real eigenvalues that move mostly a coupled zero mode. Rates that are zero to rounding
+/// become zero, so that they share a cluster, whose width is relative.
 ///
 /// A symmetric system's zero modes move with more kinetic than elastic energy. Without symmetry
 /// strong damping can deform them, but only they have momentum along which no spring acts, if the
@@ -173,7 +172,7 @@ bool CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
   if (coupled_zeros_ == 0) return false;
   if (!form_.symmetric && !work.take(cubed(c_, 8) + 2500)) return false;
   const Square<N> directions = unsprung();
-  // Without symmetry rounding errors move an eigenvalue farther.
+  // Without symmetry rounding errors move an eigenvalue further.
   const double still = form_.symmetric ? rounding() : 100 * rounding();
   StateVector<N> score = StateVector<N>::Constant(items_.size(), -1);  // -1: not eligible
   for (int i = 0; i < items_.size(); ++i) {

@@ -53,8 +53,8 @@ class CoreEigenvalues {
   const BoundedList<CoreEigenvalue, kTwice<N>>& items() const { return items_; }
 
   const State<N>& matrix() const { return A_; }
-  /// Rounding errors of eigenvalues (1/s): rates of zero modes that are no farther from each other
-  /// or from zero are equal.
+  /// Rounding errors of eigenvalues (1/s): rates of zero modes within this distance of each other
+  /// or of zero are equal.
   double rounding() const { return 64 * kEps * A_norm_; }
 
   /// Returns the eigenvector of A to a real eigenvalue, of unit length.

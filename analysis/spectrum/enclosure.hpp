@@ -102,10 +102,10 @@ double graded_radius(const PerturbationBounds<Matrix, Vector>& bounds, const Gro
 /// every t E, 0 <= t <= 1, too. As t grows, the eigenvalues of a group never meet the other
 /// eigenvalues, and so no eigenvalue counts for two groups.
 ///
-/// Rounding errors: the slack of the radius covers what is small beside it or beside delta. That of
-/// |E22| covers the rest of delta, because |E22| >= |E11|, and where |E22| is below 1e-6 of the
-/// separation, delta has no cancellation. At the border of the condition |E22| > delta / 2, whose
-/// slack is more than the rounding errors of the condition.
+/// Rounding errors: the slack of the radius covers what is small beside it or beside delta. The
+/// slack of |E22| covers the rest of delta, because |E22| >= |E11|, and where |E22| is below 1e-6
+/// of the separation, delta has no cancellation. At the border of the condition |E22| > delta / 2,
+/// whose slack is more than the rounding errors of the condition.
 template <int N, class Matrix, class Vector>
 void prove(const PerturbationBounds<Matrix, Vector>& bounds,
            BlockEnclosure<N>& enclosure) noexcept {

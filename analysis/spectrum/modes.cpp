@@ -144,7 +144,7 @@ void ModeExtractor<N>::list_roots() {
       reduce_to_hessenberg(H);
       if (!hessenberg_eigenvalues(H, values.data())) values.setConstant(kNan);
     }
-    // Backward error of the block's own QR iteration, generously. Those of zero modes are
+    // Backward error of the block's own QR iteration, generously. Blocks of zero modes are
     // triangular.
     const double factor = b.zero_mode ? 0 : b.size > 2 ? 64 * b.size : 8;
     const double radius = enclosure_.radius[k] + factor * b.size * kUnit * Lambda.norm();
@@ -279,9 +279,9 @@ ComplexVector<N> ModeExtractor<N>::left_shape(const Block& block, const Complex&
 }
 
 /// Writes shapes[which] and left_shapes[which] of a mode: the eigenvectors to the eigenvalue mu
-/// (1/s) of a block of the basis. Its backward error and condition number become those of this
-/// pair, if they are larger.
-/// Errors do not depend on lengths, and so the sums are those of vectors as they come.
+/// (1/s) of a block of the basis. The mode takes the backward error and the condition number of
+/// this pair if they are larger. Errors do not depend on lengths, so the sums use vectors of any
+/// length.
 template <int N>
 void ModeExtractor<N>::write_shape(const Block& block, const Complex& mu, std::size_t which,
                                    Mode<N>& mode) const {

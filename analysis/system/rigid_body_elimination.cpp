@@ -25,7 +25,7 @@ MatrixXd congruence(const MatrixXd& S, const MatrixXd& A) {
 
 void check(const System<>& system, const ZeroModes<>& zero_modes) {
   if (zero_modes.basis.rows() != system.dof() || zero_modes.basis.cols() != zero_modes.count) {
-    throw std::invalid_argument("elimination: the zero modes are not those of the system");
+    throw std::invalid_argument("elimination: the zero modes do not belong to the system");
   }
 }
 
@@ -44,7 +44,6 @@ MatrixXd unsprung_directions(const System<>& system, const ZeroModes<>& zero_mod
   return cholesky.matrixU().solve(svd.matrixU().rightCols(zero_modes.count));
 }
 
-/// The elimination so far: nothing removed yet.
 RigidBodyElimination nothing_removed(const System<>& system) {
   RigidBodyElimination elimination;
   elimination.constraint_matrix = MatrixXd::Identity(system.dof(), system.dof());

@@ -125,8 +125,8 @@ void average_if_symmetric(PreciseMatrix& matrix) {
 
 /// F' (size x size) with matrix = F F', or nothing if the matrix is not positive semidefinite to
 /// rounding. It comes from the eigenvalues of the matrix scaled to a unit diagonal, so that small
-/// stiffnesses survive beside large ones. Eigenvalues that cannot be told from zero are set to
-/// zero: the root of a rounding error would be a stiffness factor of 1e-8 of the largest.
+/// stiffnesses survive beside large ones. Eigenvalues that are zero to rounding are set to zero:
+/// the root of a rounding error would be a stiffness factor of 1e-8 of the largest.
 std::optional<MatrixXd> factor_transposed(const MatrixXd& matrix) {
   if ((matrix.diagonal().array() < 0).any()) return std::nullopt;
   const VectorXd scale = matrix.diagonal().cwiseSqrt();

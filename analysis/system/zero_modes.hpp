@@ -18,7 +18,7 @@ struct ZeroModes {
                                ///< the undamped frequencies, negative where K pushes away
 
   /// Safety of the rank decision: undamped frequencies (rad/s) next to the numerical floor.
-  double floor = 0;            ///< below it a frequency cannot be told from zero
+  double floor = 0;            ///< below it a frequency is zero to rounding
   double smallest_kept = 0;    ///< smallest undamped frequency of a nonzero mode; infinite if none
   double largest_dropped = 0;  ///< largest frequency taken for zero; zero if none
 };

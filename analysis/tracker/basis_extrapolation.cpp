@@ -5,7 +5,7 @@
 namespace dashpot::analysis {
 namespace {
 
-/// Squared error of an extrapolation, relative to that of a simpler one, that makes it worth using.
+/// Squared error of an extrapolation, relative to a simpler one, that makes it worth using.
 constexpr double kForeseen = 0.25;
 
 }  // namespace

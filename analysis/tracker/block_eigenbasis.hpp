@@ -47,13 +47,13 @@ inline constexpr double kConverged = 1e-9;
 /// damping). The left vectors are S Z. S has as many negative squares as Sigma, so that with a
 /// factor a basis with a proved bound proves M positive definite.
 ///
-/// Where the left vectors are no image of the right ones the basis has two sides, with the left
+/// If the left vectors do not follow from the right ones, the basis has two sides, with the left
 /// vectors in the rows of Y:
 ///
 ///     Y S Z = Sigma nearly,     S^-1 B Z = Z Lambda,     Y B S^-1 = Sigma Lambda Sigma Y.
 ///
-/// Sigma is no signature there: the sign of a left vector is free, and with these signs what
-/// follows from Y S Z and Y B Z is computed as for a symmetric system, where Y = Z'. The two
+/// Sigma does not express sign types there: the sign of a left vector is free. With these signs the
+/// results of Y S Z and Y B Z are computed as for a symmetric system, where Y = Z'. The two
 /// eigenvalues of a block are any two. There are as many blocks as joints without a factor; zero
 /// modes are the last of them then, with an eigenvalue of zero to rounding.
 struct BlockEigenbasis {
@@ -64,7 +64,7 @@ struct BlockEigenbasis {
   bool two_sided = false;
   int still = 0;  ///< of `modes`: blocks that are zero modes all the same, the last ones; two-sided
                   ///< bases without a factor have them
-  double still_floor = 0;  ///< frequency below which these were told from others, rad/s
+  double still_floor = 0;  ///< frequency below which blocks became zero modes, rad/s
   PackedMatrix Y;          ///< of the size of Z, if two_sided
   /// Lambda of mode i is [l00 l01; l10 l11](i), 1/s.
   Entries l00{}, l01{}, l10{}, l11{};

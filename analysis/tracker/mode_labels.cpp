@@ -78,7 +78,7 @@ std::array<int, kMaxDof> ModeLabels::match(const System<kMaxDof>& system, bool s
   }
   SymmetricPencil metric = symmetric_pencil(system);
   Square<kMaxDof> positions;
-  if (!metric.factored && (basis.two_sided || !symmetric)) {  // K is none then
+  if (!metric.factored && (basis.two_sided || !symmetric)) {  // K is not a metric then
     const double rate2 = system.stiffness.cwiseAbs().maxCoeff() / system.mass.cwiseAbs().maxCoeff();
     positions = rate2 * system.mass;
     metric.W = positions.data();

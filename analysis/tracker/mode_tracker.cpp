@@ -308,7 +308,7 @@ void ModeTracker::publish_direct(const SymmetricPencil& pencil, TrackedSpectrum&
   const BlockEigenbasis before = basis_;
   set_planes(pencil, spectrum_, basis_);
   const std::array<int, kMaxDof> index = match(before);
-  out.status = spectrum_.status;  // not that of an attempt to follow
+  out.status = spectrum_.status;  // not the status of an attempt to follow
   out.origin = SpectrumOrigin::kDirect;
   out.epoch = labels_.epoch;
   out.mode_count = spectrum_.modes.size();

@@ -11,7 +11,7 @@
 namespace dashpot::analysis {
 namespace {
 
-/// Times the squared frequency that told zero modes from others: rounding errors may reach it.
+/// Times the squared frequency that separated zero modes from others: rounding errors may reach it.
 constexpr double kWellAbove = 4;
 
 using Roots = std::array<BlockRoot, 2 * kMaxDof>;
@@ -47,7 +47,7 @@ struct VectorGroup {
   std::array<Complex, 4> w0, w1, mu;
 };
 
-/// Lambda, and so w, is that of the basis before the step E.
+/// Lambda, and so w, belongs to the basis before the step E.
 void set_vector(const BlockEigenbasis& basis, const PackedMatrix& E, int i, const Complex& mu,
                 int lane, VectorGroup& group) {
   const int j = basis.modes + i;
@@ -110,7 +110,7 @@ void write_shapes(const BlockEigenbasis& basis, const PackedMatrix& momenta, int
   }
 }
 
-/// Makes zero modes of the still blocks; false if these are to be told from others again.
+/// Makes zero modes of the still blocks; false if the zero modes have to be decided again.
 bool part_zero_modes(const BlockEigenbasis& basis, TrackedSpectrum& out) {
   const double floor2 = basis.still_floor * basis.still_floor;
   for (int i = 0; basis.zeros == 0 && i < basis.modes; ++i) {

@@ -190,7 +190,7 @@ bool start_two_sided(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spe
 void form_stiffness(System<kMaxDof>& system) noexcept {
   const auto& W = system.stiffness_factor;
   const Eigen::Index n = system.dof();
-  // Products are exact, sums within 3 u^2 of partial sums no longer than those of absolute values.
+  // Products are exact; errors of sums are 3 u^2 of partial sums, at most of the absolute values.
   const double loss = 4 * static_cast<double>(W.rows()) * kUnit * kUnit;
   if (system.stiffness_error.size() == 0) system.stiffness_error.setZero(n, n);
   system.stiffness.resize(n, n);

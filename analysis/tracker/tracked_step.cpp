@@ -18,8 +18,8 @@ constexpr double kTinyStep = 1e-6;
 /// Squares of half the difference of a mode's two eigenvalues from here on, relative to the squared
 /// size of its block: not critical.
 constexpr double kTwoRates = 1e-4;
-/// Distance of the eigenvalues of two modes, relative to that of each one's own two, below which
-/// they may coincide.
+/// Distance of the eigenvalues of two modes, relative to the distance of each mode's own two, below
+/// which they may coincide.
 constexpr double kAlike = 0.03;
 /// Alike modes coincide that differ by less than this part of the couplings that the rest of the
 /// step, to its square, and rounding errors bring about.

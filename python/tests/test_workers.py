@@ -90,7 +90,7 @@ def test_regions_are_lowered_to_what_every_loop_bears(panda):
 
 @pytest.mark.parametrize("given, message", [
     (dict(task_stiffness=[1] * 6, samples=9, delay=1), "period: missing"),
-    (dict(task_stiffness=[1] * 6, samples=9, period=1e-3, gain_margin=0.5), "a gain margin below 1"),
+    (dict(task_stiffness=[1] * 6, samples=9, period=1e-3, gain_margin=0.5), "the gain margin has to be at least 1"),
     (dict(), "give one of task_stiffness and joint_stiffness"),
     (dict(task_stiffness=[1] * 6), "a region without postures"),
     (dict(task_stiffness=[1] * 6, samples=9, structure="round"), "none of full, block and diagonal"),
