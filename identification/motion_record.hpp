@@ -12,8 +12,8 @@ using analysis::modulus;
 struct MotionRecord {
   Eigen::VectorXd time;    ///< N, s, strictly rising; need not be evenly spaced
   Eigen::MatrixXd output;  ///< channels x N, in any units; NaN where a sample is missing
-  /// inputs x N, in any units: what moved the arm from each sample to the next; no sample is
-  /// missing. Empty: it was not measured.
+  /// inputs x N, in any units: excitation from each sample to the next; no sample is missing.
+  /// Empty: not measured.
   Eigen::MatrixXd input = {};
 };
 

@@ -3,7 +3,7 @@
 
 namespace dashpot::identification {
 
-/// The kind of a record, by which its modes are looked for, or why they cannot be.
+/// The kind of a record's motion: how its modes are identified, or why they cannot be.
 enum class MotionKind { kDecays, kAmbient, kDriven, kLimitCycle, kLargeMotion, kNothing };
 
 struct MotionVerdict {
@@ -13,10 +13,10 @@ struct MotionVerdict {
 };
 
 /// Tells by the outputs alone what kind of motion a record shows: nothing beyond noise; a limit
-/// cycle, which repeats itself with one amplitude in the second half of the record; motion that
-/// lasts and whose energy rises as often as it falls, under forces that nobody measured; or
-/// anything else, in which free decays may be. Scales of time and of the channels, offsets and slow
-/// drift make no difference.
+/// cycle, which repeats itself with one amplitude in the second half of the record; lasting motion
+/// under unmeasured forces, whose energy rises as often as it falls; or anything else, which may
+/// contain free decays. Scales of time and of the channels, offsets and slow drift make no
+/// difference.
 ///
 /// Throws std::invalid_argument as identify_decays.
 MotionVerdict judge_motion(const MotionRecord& record);

@@ -14,11 +14,11 @@ struct TorqueRecord {
   Eigen::MatrixXd torque;    ///< n x N, N m; NaN where a sample is missing
 };
 
-/// What the torques of a record contain of the model's.
+/// The part of the model's torques that a record contains.
 enum class TorqueKind : std::uint8_t {
   kWhole,           ///< all: measured, or commanded to an arm without compensation of its own
-  kWithoutGravity,  ///< all but the weight, which the robot adds by itself
-  kExternal,        ///< only what the robot's own model does not explain
+  kWithoutGravity,  ///< all but gravity, which the robot adds by itself
+  kExternal,        ///< only the part that the robot's own model does not explain
 };
 
 }  // namespace dashpot::identification

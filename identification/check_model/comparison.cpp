@@ -65,12 +65,12 @@ struct Comparison {
   TorqueFit fit;
 };
 
-/// Fits again with the torques as much later as they were found to act, until they are.
+/// Shifts the torques by the delay that was found and fits again, until no delay is left.
 std::unique_ptr<Comparison> take_delay(const controller::RobotModel& model,
                                        const std::vector<TorqueRecord>& records, RecordFilter how,
                                        const ModelCheckOptions& options, TorqueKind kind,
                                        std::unique_ptr<Comparison> last) {
-  constexpr double kLongest = 0.1;  // s: longer is no delay, but another motion
+  constexpr double kLongest = 0.1;  // s: a longer delay means another motion
   for (int round = 0; round < 4 && !last->fit.delay_is_taken(); ++round) {
     how.torque_delay = last->fit.delay();
     if (std::abs(how.torque_delay) > kLongest) break;
@@ -102,14 +102,14 @@ std::optional<controller::RobotDescription> hung(const controller::RobotDescript
   return found;
 }
 
-/// Whether gravity that moved so much, over its size, is where the torques have it.
+/// Whether gravity, which changed by `moved` of its size, has settled.
 bool settled(double moved, double deviation, int tilts) {
-  // A direction along an axis is taken for exact where nothing contradicts it.
+  // A direction along an axis counts as exact unless the torques contradict it.
   constexpr double kSmallTilt = 0.005, kSettled = 1e-3;  // rad
   return moved < (tilts > 1 ? kSettled : std::max(kSmallTilt, 4 * deviation));
 }
 
-/// The kind of torques of which far less is left over than of whole ones; `best` is that of these.
+/// The kind of torques with a far smaller residual than whole ones; `best` becomes its misfit.
 TorqueKind best_kind(TorqueFit& fit, double& best) {
   TorqueKind found = TorqueKind::kWhole;
   for (const TorqueKind kind : {TorqueKind::kWithoutGravity, TorqueKind::kExternal}) {

@@ -17,7 +17,7 @@ void take(const Hypothesis& hypothesis, TorqueFit& fit) {
   fit.result = robust_fit(fit.linear);
 }
 
-/// What is said of the hypothesis taken last, if it has one column.
+/// Words for the hypothesis taken last, if it has one column.
 std::string what_it_is(const Hypothesis& hypothesis, const RobustFit& result) {
   const Index last = result.value.size() - 1;
   return hypothesis.what + " " +
@@ -36,7 +36,7 @@ std::string& suspicious(const Hypothesis& hypothesis, ModelCheck& check) {
   return check.joints[static_cast<std::size_t>(hypothesis.joint)].suspicious;
 }
 
-/// Where a payload is found, asks whether a link of another mass explains as much.
+/// If a payload was found, checks whether a link of another mass explains as much.
 void weigh_link(TorqueFit& fit, const std::vector<Hypothesis>& hypotheses, ModelCheck& check) {
   const LinkOrPayload found = link_or_payload(fit.linear, fit.result, hypotheses, fit.payload());
   if (found.link == nullptr || fit.payload_known) return;
@@ -54,7 +54,7 @@ void weigh_link(TorqueFit& fit, const std::vector<Hypothesis>& hypotheses, Model
   fit.spread = found.spread;
 }
 
-/// The one that lessens the weighted squares most, if one does by much; null otherwise.
+/// The hypothesis that reduces the weighted squares most; null if none does by much.
 const Hypothesis* best_hypothesis(const TorqueFit& fit, const std::vector<Hypothesis>& all) {
   const LinearModel& linear = fit.linear;
   const RobustFit& result = fit.result;
@@ -83,7 +83,7 @@ const Hypothesis* best_hypothesis(const TorqueFit& fit, const std::vector<Hypoth
     }
     const VectorXd whole = B.colwise().squaredNorm().transpose();
     B -= A * solver.solve(A.transpose() * B);
-    // A column that the others nearly make already, as one that was taken, is none of its own.
+    // Skips columns that depend on the others to 1e-6, such as one that was taken.
     if (!(B.colwise().squaredNorm().transpose().array() > 1e-6 * whole.array()).all()) continue;
     const MatrixXd own = B.transpose() * B;
     const VectorXd moment = B.transpose() * r;
@@ -126,7 +126,7 @@ std::optional<Eigen::Vector3d> explain(TorqueFit& fit, const controller::RobotDe
   fit.narrow_payload(check);
   std::vector<Hypothesis> hypotheses =
       list_hypotheses(robot, fit.model, fit.form, fit.model_torque);
-  if (check.kind != TorqueKind::kWhole) {  // which says little of what the robot holds by itself
+  if (check.kind != TorqueKind::kWhole) {  // the robot holds its weight itself
     std::erase_if(hypotheses,
                   [](const Hypothesis& h) { return h.what == "its torque reads" || h.gravity; });
   }
@@ -138,7 +138,7 @@ std::optional<Eigen::Vector3d> explain(TorqueFit& fit, const controller::RobotDe
     check.gravity_deviation = std::sqrt(fit.result.covariance.diagonal().tail<2>().mean());
     gravity = tilted_gravity(before, fit.result);
   }
-  const bool explains = check.order.empty();  // of another arm's motion nothing is explained
+  const bool explains = check.order.empty();  // otherwise the motion may belong to another arm
   const Hypothesis* best = explains ? best_hypothesis(fit, hypotheses) : nullptr;
   if (best == nullptr || !best->gravity) weigh_link(fit, hypotheses, check);
   for (int round = 0; round < 4 && explains; ++round) {

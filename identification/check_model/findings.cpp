@@ -31,7 +31,7 @@ Estimate rotor_estimate(const TorqueFit& fit, Index j) {
   return one;
 }
 
-/// Returns what is not determined of joint j, and which motion would tell.
+/// Returns the undetermined parameters of joint j, and the motion that would determine them.
 std::string wanted(const TorqueFit& fit, Index j, const JointCheck& joint) {
   std::string all;
   const Estimate& rotor = joint.reflected_inertia;
@@ -53,7 +53,7 @@ std::string wanted(const TorqueFit& fit, Index j, const JointCheck& joint) {
   return all;
 }
 
-/// What the part kept for validation says of joint j.
+/// Validates joint j on the validation part.
 void validate(const TorqueFit& fit, Index j, JointCheck& joint) {
   std::vector<Index> kept;
   double mean = 0, all = 0, before = 0, after = 0, neighbours = 0, last = 0;
@@ -150,7 +150,7 @@ void report_contacts(const TorqueFit& fit, std::vector<LeftOut>& contacts) {
       const Index row = k * fit.n + j;
       if (!(fit.linear.used[row] > 0)) continue;
       ++used;
-      // Where all else fits to a thousandth, what does not is no contact yet.
+      // If the other residuals are a thousandth, a residual below a hundredth is not a contact yet.
       constexpr double kSmall = 0.01;
       const bool far = std::abs(fit.result.residual[row]) > kSmall * fit.largest[j];
       off += fit.result.weight[row] < 0.05 && far ? 1 : 0;

@@ -4,15 +4,15 @@
 namespace dashpot::identification {
 
 /// After a fit, adds the hypothesis that explains most, as long as one explains much. Returns the
-/// gravity with which the torques are explained better, if it is that, or if `tilted`.
+/// gravity that explains the torques better, if gravity explains most or if `tilted`.
 std::optional<Eigen::Vector3d> explain(TorqueFit& fit, const controller::RobotDescription& robot,
                                        bool tilted, ModelCheck& check);
 
-/// Reports what was fitted, how well it is known, what is doubted, and where other forces acted.
+/// Reports the fitted values with deviations, doubts, and where other forces acted.
 void report(const TorqueFit& fit, ModelCheck& check);
 /// Reports which joints are doubted for reasons that need no hypothesis; after the estimates.
 void report_suspicions(const TorqueFit& fit, ModelCheck& check);
-/// Reports what the records cannot tell apart.
+/// Reports the parameters that the records cannot separate.
 void report_ambiguities(const TorqueFit& fit, ModelCheck& check);
 
 void add_reason(std::string& text, const std::string& reason);

@@ -7,22 +7,23 @@
 
 namespace dashpot::identification {
 
-/// Something that may be wrong with the model or a sensor, and what it would add to the torques.
+/// A possible error of the model or a sensor, and the torques that it would add.
 struct Hypothesis {
   int joint = 0;                         ///< to which it belongs
   std::vector<Eigen::MatrixXd> columns;  ///< each n x K, torque for a unit
-  /// What is said of it: "the mass of link 'a' is", and the unit, with the factor of its value.
+  /// Words for it: "the mass of link 'a' is", and the unit, with the factor of its value.
   std::string what, unit;
   double factor = 1;
   bool gravity = false;  ///< tilts it: columns as of tilt_columns
   bool link_mass = false;
 };
 
-/// Returns what gravity that is tilted by a radian would add to the torques, n x K each, in the two
+/// Returns the torques that a tilt of gravity by a radian would add, n x K each, in the two
 /// directions of tilt_directions.
 std::vector<Eigen::MatrixXd> tilt_columns(const controller::RobotDescription& robot,
                                           const WeakForm& form);
-/// Returns what a tilt of a radian adds to gravity, for two right angles to it (3 x 2, m/s^2).
+/// Returns the change of gravity by a tilt of a radian, for two directions at right angles (3 x 2,
+/// m/s^2).
 Eigen::Matrix<double, 3, 2> tilt_directions(const Eigen::Vector3d& gravity);
 
 /// A link's mass and where its centre is, the direction of gravity, and torques with a wrong scale.
@@ -32,9 +33,8 @@ std::vector<Hypothesis> list_hypotheses(const controller::RobotDescription& robo
                                         const Eigen::MatrixXd& model_torque);
 
 inline constexpr Eigen::Index kPayloadColumns = 10;  ///< of body_columns, in all
-/// Returns what a unit of mass (1), first moment (3) and inertia about the origin (6: xx yy zz xy
-/// xz yz), fixed to the tip link of `model`, takes in torques, n x K each: the first `count` of
-/// them.
+/// Returns the torques, n x K each, of a unit of mass (1), first moment (3) and inertia about the
+/// origin (6: xx yy zz xy xz yz), fixed to the tip link of `model`: the first `count` of them.
 std::vector<Eigen::MatrixXd> body_columns(const controller::RobotModel& model, const WeakForm& form,
                                           std::size_t count);
 

@@ -12,7 +12,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// By how much the sum of the logarithms of what is left over has to fall.
+/// Least fall of the sum of the logarithms of the residuals.
 constexpr double kFarBetter = 2;
 
 using Columns = ColumnOrder;
@@ -39,7 +39,7 @@ struct Guess {
   double score;
 };
 
-/// Returns what is left of y after an offset and friction that brakes, as a share of `whole`.
+/// Returns the residual of y after an offset and friction that brakes, as a share of `whole`.
 double left_over(const VectorXd& y, const VectorXd& sign, const VectorXd& velocity, double whole) {
   MatrixXd A(y.size(), 3);
   A << VectorXd::Ones(y.size()), sign, velocity;

@@ -6,7 +6,7 @@
 
 namespace dashpot::identification {
 
-/// Which column with which sign is taken for each joint.
+/// Column and sign of each joint.
 struct ColumnOrder {
   std::vector<Eigen::Index> from;
   Eigen::VectorXd sign;
@@ -15,7 +15,7 @@ struct ColumnOrder {
   Eigen::MatrixXd apply(const Eigen::MatrixXd& value) const;
 };
 
-/// What the torques seem to be, and how the columns seem to belong to the joints.
+/// The likely kind of the torques, and the likely order of the columns.
 struct JointOrder {
   TorqueKind kind = TorqueKind::kWhole;
   ColumnOrder position, torque;
@@ -27,9 +27,9 @@ struct JointOrder {
   std::vector<Eigen::Index> joints() const;
 };
 
-/// Tries the kinds of torque, exchanged columns and signs on a part of the motion. What is as it
-/// should be is only doubted where something else leaves a seventh of the variance over, at one
-/// joint, or as little at several together.
+/// Tries the kinds of torque, exchanged columns and signs on a part of the motion. The given order
+/// is only doubted if another one leaves a seventh of the variance at one joint, or as little at
+/// several together.
 JointOrder find_order(const controller::RobotModel& model, const std::vector<SmoothRun>& runs,
                       const RecordFilter& how);
 

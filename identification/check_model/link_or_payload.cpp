@@ -30,7 +30,7 @@ class SubsetFits {
     }
   }
 
-  /// Returns the sum of squares that these columns leave, and their values.
+  /// Returns the sum of squares after a fit of these columns, and their values.
   double left(const std::vector<Index>& which, VectorXd& value) const {
     const VectorXd moment = moment_(which);
     const VectorXd x = normal_(which, which).ldlt().solve(moment);

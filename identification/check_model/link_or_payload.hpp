@@ -4,7 +4,7 @@
 
 namespace dashpot::identification {
 
-/// Whether what looks like a payload may be a link of another mass.
+/// Whether an apparent payload may be a link of another mass.
 struct LinkOrPayload {
   const Hypothesis* link = nullptr;  ///< explains about as much as the payload; null: none does
   bool clearly = false;              ///< it explains far more
@@ -14,8 +14,8 @@ struct LinkOrPayload {
 
 /// Compares, beside a fit, the payload (10 columns from `payload` on) with each hypothesis of a
 /// link's mass in its place. Sums of squares are in units of each joint's residual and of as many
-/// windows as are independent, so that differences above 10 are clear. No link, where there is no
-/// clear payload.
+/// windows as are independent, so that differences above 10 are clear. No link without a clear
+/// payload.
 LinkOrPayload link_or_payload(const LinearModel& model, const RobustFit& fit,
                               const std::vector<Hypothesis>& hypotheses, Eigen::Index payload);
 

@@ -82,8 +82,8 @@ VectorXd sizes(const LinearModel& model, const VectorXd& residual) {
 
 constexpr double kTukey = 6;  // deviations, beyond which nothing counts
 
-/// Returns by how much the estimate of a joint's parameters moves with its residuals, over what it
-/// would with constant weights w: mean w / mean (w r)'.
+/// Returns the sensitivity of a joint's parameters to its residuals, over the sensitivity with
+/// constant weights w: mean w / mean (w r)'.
 double response(const RobustFit& fit, const VectorXd& row_weight, Index joint) {
   double weight = 0, slope = 0;
   for (Index row = joint; row < fit.residual.size(); row += fit.sigma.size()) {
@@ -118,7 +118,7 @@ MatrixXd long_run_variance(const MatrixXd& scores, double& degrees) {
   return sums * sums.transpose() / degrees;
 }
 
-/// By how much the variance of a mean of these residuals exceeds that of white ones.
+/// Variance of the mean of these residuals, over the variance for white ones.
 double inflation(const std::vector<double>& residual) {
   const std::size_t N = residual.size();
   double power = 0;
@@ -164,7 +164,7 @@ MatrixXd covariance_of(const LinearModel& model, RobustFit& fit, const VectorXd&
       own.noalias() += weighted.row(row).transpose() * model.A.row(row);
     }
     if (count == 0) continue;
-    // What the fit took from so few residuals that are as good as independent.
+    // The fit took degrees of freedom from few independent residuals.
     const double inflated = fit.inflation[j] = inflation(residual), independent = count / inflated;
     const double left = std::max(2.0, independent - per_joint);
     const double variance = square / (weight * std::pow(fit.sigma[j], 4));
@@ -208,8 +208,8 @@ RobustFit robust_fit(const LinearModel& model) {
     fit.residual = model.y - model.A * fit.value;
     fit.sigma = sizes(model, fit.residual);
     if (round + 1 == kRounds) break;
-    // Huber's weights first, which find the way from anywhere, then Tukey's, which leave nothing of
-    // what is far off.
+    // Huber's weights first, which converge from any start, then Tukey's, which drop outliers
+    // entirely.
     const bool far = round < kRounds / 2;
     for (Index row = 0; row < model.y.size(); ++row) {
       const double size = std::abs(fit.residual[row]) / fit.sigma[row % n];

@@ -25,9 +25,9 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// How many rows each new sample is repeated in a record that was written faster than the robot
-/// reports; 1: not at all. Runs of equal rows are then all about as long, whereas those of an arm
-/// at rest, or of coarse encoders, are not.
+/// Rows per new sample in a record that was written faster than the robot reports; 1: no
+/// repetition. Repetition makes runs of equal rows all about as long; an arm at rest or coarse
+/// encoders do not.
 Index repeats_of(const std::vector<Index>& runs) {
   std::vector<double> lengths(runs.begin(), runs.end());
   const double median = median_of(lengths);
@@ -150,7 +150,7 @@ double noise_of(const MatrixXd& value, Index channel) {
                   quantum / std::sqrt(12.0));
 }
 
-/// How many times the noise of samples `step` apart the rate's noise is, 1/s.
+/// Noise of the rate over the noise of samples `step` apart, 1/s.
 double rate_gain(double h, double step) {
   const auto reach = static_cast<Index>(std::floor(h / step * (1 - 1e-9)));
   const VectorXd u =
@@ -185,7 +185,7 @@ RecordFilter choose_smoothing(const std::vector<TorqueRecord>& records) {
     for (Index j = 0; j < n; ++j) {
       noise[j] = std::max(noise[j], noise_of(samples.value, j));
       if (samples.time.size() < 2) continue;
-      // Mean speed: that of the path between samples far apart.
+      // Mean speed along the path between samples far apart.
       const auto apart = std::max<Index>(1, static_cast<Index>(0.1 / step));
       double way = 0;
       for (Index i = apart; i < samples.value.cols(); i += apart) {

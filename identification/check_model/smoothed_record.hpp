@@ -24,8 +24,8 @@ struct SmoothRun {
 /// quantisation. Throws std::invalid_argument if there are too few samples.
 RecordFilter choose_smoothing(const std::vector<TorqueRecord>& records);
 
-/// Smooths the records: positions and torques with the same weights, so that what the filter
-/// takes from one side of the equations of motion it takes from the other.
+/// Smooths the records: positions and torques with the same weights, so that the filter changes
+/// both sides of the equations of motion alike.
 std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const RecordFilter& how);
 
 }  // namespace dashpot::identification

@@ -23,7 +23,7 @@ void doubt_rotor(const TorqueFit& fit, Index j, JointCheck& joint) {
                                    then_leaves(fit, j, joint.residual_after, old));
 }
 
-/// Compares what is left over with the torque that varies with the motion.
+/// Compares the residual with the torque that varies with the motion.
 void doubt_rest(const TorqueFit& fit, Index j, JointCheck& joint) {
   VectorXd varying = fit.torque.reshaped();
   double mean = 0, count = 0;

@@ -11,8 +11,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// About what a body held at the tip can have about the tip link's origin, kg m^2: ordinary motion
-/// says little of its inertia, and must not make the mass uncertain by it.
+/// Typical inertia of a body at the tip about the tip link's origin, kg m^2: ordinary motion hardly
+/// determines this inertia, which must not make the mass uncertain.
 constexpr double kPayloadInertia = 0.1;
 /// The same of a body of a known mass, beside its size: m from its centre.
 constexpr double kPayloadSize = 0.1;
@@ -55,11 +55,11 @@ std::vector<Purpose> purposes(const WeakForm& form, double share) {
   return result;
 }
 
-/// The sum of the logarithms of what the joints leave over.
+/// The sum of the logarithms of the joints' residuals.
 double left_over_of(const TorqueFit& fit) {
   double sum = 0;
   for (Index j = 0; j < fit.n; ++j) {
-    // What leaves less than a thousandth over is as good as all others that do.
+    // All residuals below a thousandth count as equal.
     const double size = std::max(fit.result.sigma[j], 1e-3 * fit.largest[j]);
     if (fit.moves[j] && size > 0) sum += 2 * std::log(size);
   }
@@ -132,7 +132,7 @@ double TorqueFit::fit(TorqueKind kind) {
   if (kind != TorqueKind::kExternal) model_torque += own.inertial;
   if (kind == TorqueKind::kWhole) model_torque += own.gravity;
   linear.prior.segment(rotor(0), n) = rotor_prior;
-  // Rotors are in what external torques leave out.
+  // External torques leave out the rotors.
   if (kind == TorqueKind::kExternal) linear.prior.segment(rotor(0), n).setConstant(kHeld);
   linear.y = (torque - model_torque).reshaped();
   result = robust_fit(linear);

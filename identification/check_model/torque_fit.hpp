@@ -10,26 +10,25 @@ namespace dashpot::identification {
 inline constexpr double kUndetermined = std::numeric_limits<double>::infinity();
 inline constexpr double kHeld = 1e-9;
 
-/// What a window is for.
 enum class Purpose : std::uint8_t { kFit, kValidation, kNothing };
 
 /// The fit of a model to the torques of windows. Its parameters are offset, Coulomb and viscous
 /// friction of each joint (3 n), the payload's mass, first moment (3) and inertia (6) about the tip
 /// link's origin, beyond the model's, reflected inertias (n) beyond the model's, the rest of the
-/// delay, and what hypotheses add.
+/// delay, and the hypotheses' parameters.
 struct TorqueFit {
   /// Keeps `robot` and `windows`, which have to outlive it.
   TorqueFit(const controller::RobotModel& robot, const std::vector<SmoothRun>& runs,
             const RecordFilter& how, const WeakForm& windows, const ModelCheckOptions& options);
 
-  /// Fits torques of a kind. Returns the sum of the logarithms of what the joints leave over.
+  /// Fits torques of a kind. Returns the sum of the logarithms of the joints' residuals.
   double fit(TorqueKind kind);
-  /// The same for whole torques, with gravity in a direction near that of the robot.
+  /// The same for whole torques, with gravity in a direction near the robot's.
   double fit_inclined(const controller::RobotDescription& robot);
   /// Adds a parameter, whose column is n x K.
   void add(const Eigen::MatrixXd& column, double prior);
   /// After a fit, gives the payload's inertia the prior of a body of its mass, holds rotors that
-  /// only the payload is told apart from, and fits again.
+  /// cannot be separated from the payload, and fits again.
   void narrow_payload(ModelCheck& check);
 
   Eigen::Index payload() const { return 3 * n; }
@@ -43,9 +42,9 @@ struct TorqueFit {
   double moved_mass() const;  ///< kg
 
   // After a fit:
-  /// The largest share of a joint's largest torque that is left over.
+  /// The largest residual of a joint, as a share of its largest torque.
   double most_left() const;
-  /// s by which torques act later than their times say, in all.
+  /// Delay of the torques after their times, in all, s.
   double delay() const { return taken_delay + result.value[rest_of_delay()]; }
   /// Whether the rest of the delay is too small for another fit.
   bool delay_is_taken() const;

@@ -30,15 +30,15 @@ class WeakForm {
   Eigen::MatrixXd torque() const;
   Eigen::MatrixXd torque_rate() const;
 
-  /// The model's torques: -integral f' p - integral f (Mdot qd - C qd), and integral f g. A joint
-  /// of the chain that the kernel has not, a chain being shorter, has zeros.
+  /// The model's torques: -integral f' p - integral f (Mdot qd - C qd), and integral f g. Joints
+  /// beyond the kernel's chain have zeros.
   WindowTorques torques(const controller::DynamicsKernel& kernel, Eigen::Index joints) const;
 
-  /// -integral f' qd: what a unit of reflected inertia takes.
+  /// -integral f' qd: the torque of a unit of reflected inertia.
   Eigen::MatrixXd acceleration() const;
 
-  /// Returns what friction does at a velocity that exceeds its noise: integral f s(qd) and integral
-  /// f qd, with s = -1, 0 or 1, straight between -v0 and v0.
+  /// Returns the effect of friction at a velocity above its noise: integral f s(qd) and integral f
+  /// qd, with s = -1, 0 or 1, straight between -v0 and v0.
   Eigen::MatrixXd sign(const Eigen::VectorXd& v0) const;
   Eigen::MatrixXd velocity() const;
 

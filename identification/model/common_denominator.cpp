@@ -70,7 +70,7 @@ MatrixXd both(const MatrixXcd& lines) {
   return result;
 }
 
-/// The poles of one order; `step` is that of z.
+/// The poles of one order; `step` (s) belongs to z.
 std::vector<RealizedPole> poles_of(const Lines& lines, int order, double step) {
   const Index width = order + 1, all = lines.delay.size();
   const auto records = static_cast<Index>(lines.first.size()) - 1;

@@ -85,7 +85,7 @@ std::array<double, 2> rate_of(const std::array<double, 2>& x, double zeta) {
   return {-zeta * x[0] - (1 - zeta * zeta) * x[1], x[0] - zeta * x[1]};
 }
 
-/// Adds what a source makes to a row of the columns of a factor; to `by_scale` what its scales do.
+/// Adds a source's motion to a row of a factor's columns, its derivatives by scales to `by_scale`.
 void add_wave(const DecayFactor& factor, std::size_t source, Index at, const Wave& wave,
               FactorColumns& columns, std::array<MatrixXd, 2>* by_scale) {
   const auto [alpha, beta] = factor.scale[source];
@@ -167,8 +167,8 @@ std::vector<Wave> free_waves(const DecayFactor& factor, const VectorXd& time, bo
   return waves;
 }
 
-/// The mean in each of the `cells` of what an input makes of a factor at rest: the sum over the
-/// values before, each a start of the factor's own.
+/// The mean, in each of the `cells`, of a factor's response to an input from rest: a sum over the
+/// earlier values, each a start of the factor's own.
 std::vector<Wave> forced_waves(const DecayFactor& factor, const DrivenGrid& grid, Index input,
                                bool derivatives, const std::vector<Index>& cells) {
   const Stepper stepper(factor, grid.step);

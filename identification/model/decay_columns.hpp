@@ -7,7 +7,7 @@
 namespace dashpot::identification {
 
 /// The motions of a factor in all records, samples x 2 or x 1, and their derivatives by `first`,
-/// `second` and the scales: of each record those by its own scales, which move no other one.
+/// `second` and each record's own scales, which change no other record.
 struct FactorColumns {
   Eigen::MatrixXd value;
   std::vector<Eigen::MatrixXd> by_eigenvalue;
@@ -17,21 +17,21 @@ struct FactorColumns {
 
 FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool derivatives);
 
-/// The inputs themselves, samples x inputs: what follows them at once, such as modes far above.
+/// The inputs themselves, samples x inputs: the direct response, such as of modes far above.
 Eigen::MatrixXd direct_columns(const DecayPart& part);
 
-/// Takes from the rows of each record what its constant, and its drift if there is one, can be.
+/// Projects the constant, and the drift if any, out of each record's rows.
 void take_constants(const DecayPart& part, Eigen::MatrixXd& columns);
 
 /// A product of the motions of two factors that have products.
 struct MotionProduct {
   Complex eigenvalue;             ///< lambda_i + lambda_j, 1/s; not below the real axis
-  std::vector<Complex> strength;  ///< of each source, the product of those of both
+  std::vector<Complex> strength;  ///< of each source, the product of both factors' strengths
 };
 
-/// The products of two eigenvalues of such factors, squares included; of two that are conjugate the
-/// one above the real axis. The free motion of a smooth system near rest is a sum of such powers
-/// (Poincare); those of third order and more are left out. The factors' scales have to be known.
+/// The products of two eigenvalues of such factors, squares included; of a conjugate pair the one
+/// above the real axis. The free motion of a smooth system near rest is a sum of such powers
+/// (Poincare); third and higher orders are omitted. The factors' scales have to be known.
 std::vector<MotionProduct> products_of(const std::vector<DecayFactor>& factors);
 
 /// The motions of `products`, samples x (2 for each, or 1 if it is real).

@@ -8,24 +8,23 @@
 namespace dashpot::identification {
 
 /// A factor of the characteristic polynomial of decays, s^2 + 2 zeta omega s + omega^2, underdamped
-/// or not, or s - lambda, and how strongly and in which phase each record has it.
+/// or not, or s - lambda, with its strength and phase in each record.
 struct DecayFactor {
   bool pair = true;
   double first = 0;   ///< log(omega), omega in rad/s; or lambda, 1/s
   double second = 0;  ///< zeta; not used by a single lambda
-  /// A factor moves in each record because of what was before, and, where there are inputs, because
-  /// of each input: these are its sources, the records first. Where the reference source makes the
-  /// motion x(t), source s makes scale[s][0] x + scale[s][1] x' / omega, or scale[s][0] x for a
-  /// single lambda: one shape for all. Empty: not known yet.
+  /// A factor moves in each record because of earlier motion, and because of each input, if any:
+  /// these are its sources, the records first. If the reference source makes the motion x(t),
+  /// source s makes scale[s][0] x + scale[s][1] x' / omega, or scale[s][0] x for a single lambda:
+  /// one shape for all. Empty: not known yet.
   std::vector<std::array<double, 2>> scale = {};
   std::size_t reference = 0;
-  /// Whether the model has the products of this pair's motion with itself and with those of other
-  /// pairs of which this is said: what an arm that is not quite linear makes of them, to second
-  /// order.
+  /// True if the model has the products of this pair's motion with itself and with the motions of
+  /// other such pairs: the second-order response of a weakly nonlinear arm.
   bool has_products = false;
 
   int parameters() const { return pair ? 2 : 1; }
-  /// 1/s; the same one twice where there is one.
+  /// 1/s; a single one twice.
   std::array<Complex, 2> eigenvalues() const;
 
   static DecayFactor of_pair(Complex eigenvalue);  ///< and its conjugate
@@ -34,21 +33,21 @@ struct DecayFactor {
   DecayFactor one_of_pair(double eigenvalue) const;
 };
 
-/// What moved a record, on an even grid whose points are fitted in cells.
+/// The excitation of a record, on an even grid whose points are fitted in cells.
 struct DrivenGrid {
   Eigen::MatrixXd input;  ///< inputs x points; each value holds until the next
   double step = 0;        ///< s
   Eigen::Index per_cell = 1;
 };
 
-/// What records say for channels that have samples at the same times.
+/// The data of channels that have samples at the same times.
 struct DecayPart {
   std::vector<Eigen::VectorXd> time;   ///< of each record, s, from its beginning
   Eigen::MatrixXd output;              ///< samples of all records, one after the other, x channels
   std::vector<Eigen::Index> channels;  ///< which of the records' channels
   bool drifts = false;                 ///< each record has a slope as well as a constant
-  /// With inputs: of each record the numbers of the cells that the samples are means of, and what
-  /// moved it.
+  /// With inputs: of each record the numbers of the cells that the samples are means of, and the
+  /// excitation.
   std::vector<std::vector<Eigen::Index>> cells = {};
   std::shared_ptr<const std::vector<DrivenGrid>> driven = {};
 
@@ -64,12 +63,12 @@ struct DecayData {
   /// Standard deviation of each channel; no noise is taken to be less than kLinear of it.
   Eigen::VectorXd motion;
 
-  /// To which share of itself the motion of an arm is linear, at best. What is smaller is not
-  /// looked for in it.
+  /// Smallest nonlinearity of an arm's motion, relative to the motion. Smaller modes are not
+  /// sought.
   static constexpr double kLinear = 1e-4;
 
-  /// Standard deviation of what rounds each channel, where that is its noise; else 0. It is alike
-  /// from sample to sample, so that means of samples have as much.
+  /// Standard deviation of each channel's rounding, if rounding is its noise; else 0. Rounding is
+  /// alike from sample to sample, so that means of samples have as much.
   Eigen::VectorXd rounding;
 
   double least_noise(Eigen::Index channel) const;

@@ -15,11 +15,11 @@
 namespace dashpot::identification {
 namespace {
 
-/// The criterion's cost of one more parameter: between Akaike's 2, which takes noise for modes, and
+/// The criterion's cost of a parameter: between Akaike's 2, which takes noise for modes, and
 /// Schwarz's logarithm of the number of samples, about 9, which lets weak modes spoil strong ones.
 constexpr double kPenalty = 4;
 /// Akaike's is the cost of as many modes of decays as there are channels: an arm is expected to
-/// have them, and a model that lacks one shifts those near it. With inputs it only finds fewer.
+/// have them, and a model that lacks one shifts its neighbours. With inputs it only finds fewer.
 constexpr double kExpected = 2;
 
 /// Radians, or powers of e, from sample to sample: what is faster is over before the second one.
@@ -37,7 +37,7 @@ constexpr double kSettledNoise = 0.02;     ///< change of its logarithm that mov
 
 // Of what is determined. A ridge grows from rounding until the normal matrix is definite.
 constexpr double kRidge = 1e-9, kRidgeStep = 100;
-constexpr double kUnderflow = 1e-200;  ///< squares of derivatives: below it they are none
+constexpr double kUnderflow = 1e-200;  ///< squares of derivatives: smaller ones count as zero
 constexpr double kDetermined = 1e-13;  ///< of the largest eigenvalue: what is less is rounding
 
 std::vector<DecayFactor> moved(const std::vector<DecayFactor>& factors, const VectorXd& step) {
@@ -78,9 +78,9 @@ std::array<double, 2> length_and_step(const DecayData& data) {
   return result;
 }
 
-/// Fits `factors` and the noise of channels and records together, from what `fit` has of them: each
-/// step is that of Levenberg and Marquardt with the noise of the last one, and counts by the
-/// likelihood. Gives up where -2 log likelihood will stay above `hopeless`.
+/// Fits `factors` and the noise of channels and records together, starting from `fit`. Each step
+/// follows Levenberg and Marquardt with the noise of the last one, and is accepted by the
+/// likelihood. Gives up if -2 log likelihood will stay above `hopeless`.
 class Descent {
  public:
   Descent(const DecayData& data, DecayFit& fit) : data_(data), fit_(fit) {}
@@ -139,7 +139,7 @@ class Descent {
     for (Index c = 0; c < data_.channels; ++c) {
       const double least = std::pow(data_.least_noise(c), 2);
       const double square = there.squares.row(c).dot(inverse) / count[c];
-      // Below the least noise what is left over still counts by its squares.
+      // Below the least noise the residual still counts by its squares.
       sum += count[c] * (square > least ? std::log(square) : std::log(least) + square / least - 1);
     }
     return sum;
@@ -183,9 +183,9 @@ class Descent {
   bool hopeless_ = false;
 };
 
-/// By how much the variance of the estimates exceeds that for white noise, because what is left
-/// over is alike from sample to sample: the mean over the parameters, in the coordinates in which
-/// they are uncorrelated, of sums of scores over stretches of time (batch means).
+/// Variance of the estimates over the variance for white noise, because the residual is alike from
+/// sample to sample: the mean over the parameters, in the coordinates in which they are
+/// uncorrelated, of sums of scores over stretches of time (batch means).
 double variance_growth(const VariableProjection& evaluation) {
   const Index p = evaluation.normal.rows();
   if (p == 0) return 1;
@@ -204,8 +204,8 @@ double variance_growth(const VariableProjection& evaluation) {
 DecayStep step_of(const VariableProjection& there, const DecayData& data,
                   const std::vector<DecayFactor>& factors, double whiteness) {
   const Index p = there.normal.rows(), eigen = factor_width(factors);
-  // Scaled, so that parameters of unlike size are no deficiency. One that moves nothing, so that
-  // squares underflow, tells nothing and is not determined.
+  // Scaled, so that parameters of unlike size do not look deficient. A parameter that moves
+  // nothing, so that squares underflow, is not determined.
   const VectorXd scale = there.normal.diagonal().unaryExpr(
       [](double square) { return square > kUnderflow ? 1 / std::sqrt(square) : 0; });
   // Where two factors have become alike, some direction is not determined; the others still are.

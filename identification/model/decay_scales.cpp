@@ -29,7 +29,7 @@ void find_scales(const DecayData& data, const VectorXd& noise, std::vector<Decay
     for (DecayFactor& factor : factors) factor.scale.assign(1, {1, 0});
     return;
   }
-  // What each source makes of each factor, by itself.
+  // The response of each factor to each source, by itself.
   const Index eigen = factor_width(factors);
   const auto blocks = static_cast<Index>(sources);
   std::vector<MatrixXd> amplitudes(sources, MatrixXd::Zero(eigen, data.channels));

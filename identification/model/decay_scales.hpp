@@ -5,8 +5,8 @@
 
 namespace dashpot::identification {
 
-/// Gives factors that have none the scales that fit best the amplitudes that each record has by
-/// itself. `noise` is that of each channel.
+/// Gives factors without scales the scales that best fit the amplitudes that each record has by
+/// itself. `noise` has each channel's noise.
 void find_scales(const DecayData& data, const Eigen::VectorXd& noise,
                  std::vector<DecayFactor>& factors);
 

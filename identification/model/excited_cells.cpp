@@ -20,11 +20,11 @@ constexpr double kInBand = 0.99;     // share of the inputs' squares within thei
 constexpr double kBeyondInputs = 3;  // times the inputs' band, or a part: motion is within them
 constexpr double kLeastCells = 1.5, kWantedCells = 2.2;  // in half a period of the fastest motion
 constexpr Index kFewestCells = 20;                       // of a record
-// Of a length, so that rounding leaves no point out; of a step, a sample that is no later, and one
-// that is taken as it is.
+// Of a length, so that rounding leaves no point out; of a step, up to which a sample counts as not
+// later, or as on time.
 constexpr double kOfLength = 1e-9, kSameTime = 1e-6, kOnTime = 1e-3;
 
-/// rad/s below which 99 % of what the inputs do is.
+/// Frequency below which 99 % of the inputs' squares are, rad/s.
 double input_band(const std::vector<DrivenGrid>& grids) {
   double band = 0;
   for (const DrivenGrid& grid : grids) {

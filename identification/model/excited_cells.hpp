@@ -8,7 +8,7 @@ namespace dashpot::identification {
 
 /// Records with inputs in evenly spaced cells, each the mean of the samples in a stretch of time.
 struct ExcitedCells {
-  /// Throws std::invalid_argument where no input moves, or nothing follows it.
+  /// Throws std::invalid_argument if no input moves, or nothing follows it.
   explicit ExcitedCells(const std::vector<MotionRecord>& all);
 
   std::vector<MotionRecord> records;  ///< in the channels' units; NaN in gaps

@@ -11,7 +11,7 @@
 
 namespace dashpot::identification {
 
-/// What has fallen to this share by the next sample is over, and no sum of decays shows it.
+/// A decay that falls to this share by the next sample is over, and no sum of decays shows it.
 constexpr double kOver = 1e-4;
 constexpr double kRank = 1e-14;  ///< of the largest singular value: the rest is rounding
 

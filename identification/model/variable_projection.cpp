@@ -95,7 +95,7 @@ VariableProjection::Fitted VariableProjection::fit(const DecayPart& part, const 
   }
   basis = weight.asDiagonal() * basis;
   output = weight.asDiagonal() * output;
-  // Columns of very different size, as those of a mode that is over at once, are no deficiency.
+  // Scaled, so that columns of very different size, such as of a fast decay, do not look deficient.
   const VectorXd size = basis.colwise().norm().transpose().cwiseMax(kTiny);
   basis *= size.cwiseInverse().asDiagonal();
   Fitted fitted{Eigen::ColPivHouseholderQR<MatrixXd>(basis), std::move(weight), {}, {}};
@@ -139,12 +139,12 @@ VariableProjection::Jacobian VariableProjection::jacobian(const DecayPart& part,
   J.everywhere.resize(N, most * (1 + part.inputs()));
   J.shapes.resize(most, channels);
   for (const VectorXd& time : part.time) J.of_record.emplace_back(time.size(), most);
-  std::vector<Index> used(records + 1);  // motions, those of everywhere last
+  std::vector<Index> used(records + 1);  // motions, `everywhere` last
   std::vector<std::size_t> home;         // of each parameter's motions, among `used`
   Index column = 0, shape = 0;
   for (const DecayFactor& factor : factors_) {
     const Index width = factor.parameters(), rank = std::min(width, channels);
-    // Where large amplitudes of the two columns of a pair cancel, they do so here.
+    // Large amplitudes of the two columns of a pair cancel here.
     const Eigen::HouseholderQR<MatrixXd> qr(fitted.amplitude.middleRows(column, width).transpose());
     const MatrixXd amplitude =
         MatrixXd(qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>()).transpose();

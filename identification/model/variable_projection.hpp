@@ -8,9 +8,9 @@
 
 namespace dashpot::identification {
 
-/// The least-squares problem that is left of a sum of decays when its amplitudes are eliminated, at
-/// some factors: variable projection (Golub and Pereyra 1973) with Kaufman's Jacobian, in which
-/// products, small beside what they are products of, count as constant.
+/// The least-squares problem of a sum of decays whose amplitudes are eliminated, at some factors:
+/// variable projection (Golub and Pereyra 1973) with Kaufman's Jacobian, in which the small
+/// products of motions count as constant.
 class VariableProjection {
  public:
   /// `noise` is each channel's, `record_noise` each record's, relative to it; standard deviations.
@@ -21,7 +21,7 @@ class VariableProjection {
   void differentiate();
 
   /// The sum over stretches of time and channels of s' N^-1 s, with N = `normal` = L L' and the
-  /// part s of `gradient` that comes of such a stretch.
+  /// part s of `gradient` from such a stretch.
   double squared_scores(const Eigen::LLT<Eigen::MatrixXd>& factor) const;
 
   /// J'J, weighted; parameters: of each factor the eigenvalues, then its scales.
@@ -38,16 +38,16 @@ class VariableProjection {
   struct Parameter {
     Eigen::Index shape, motion, rank;
   };
-  /// J of a part. Motions come from the eigenvalues and inputs, in all records, first; then of each
-  /// record those that its scales make, in its rows alone.
+  /// J of a part. The motions by eigenvalues and inputs, in all records, come first; then each
+  /// record's motions by its scales, in its rows alone.
   struct Jacobian {
     std::vector<Parameter> parameters;
     Eigen::MatrixXd everywhere;              ///< samples x motions
     std::vector<Eigen::MatrixXd> of_record;  ///< samples of the record x motions
     std::vector<Eigen::Index> first;         ///< row and motion of each record, and the end
     std::vector<Eigen::Index> first_row;
-    Eigen::MatrixXd shapes;    ///< shapes x channels, those of a factor orthonormal
-    Eigen::MatrixXd basis;     ///< Q, samples x rank: what the amplitudes can do
+    Eigen::MatrixXd shapes;    ///< shapes x channels, a factor's shapes orthonormal
+    Eigen::MatrixXd basis;     ///< Q, samples x rank: the span of the amplitudes
     Eigen::MatrixXd on_basis;  ///< Q' J, rank x motions
 
     Eigen::Index motions() const { return first.back(); }
@@ -63,7 +63,7 @@ class VariableProjection {
   Fitted fit(const DecayPart& part, const Eigen::VectorXd& noise,
              const Eigen::VectorXd& record_noise);
   Jacobian jacobian(const DecayPart& part, const Fitted& fitted) const;
-  /// motions x channels: sums over rows from `from` of a record, of J times what is left over.
+  /// motions x channels: sums over rows from `from` of a record, of J times the residual.
   static Eigen::MatrixXd sums(const Jacobian& jacobian, const Fitted& fitted, std::size_t record,
                               Eigen::Index from, Eigen::Index count);
   static Eigen::MatrixXd products(const Jacobian& jacobian);

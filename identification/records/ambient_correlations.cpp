@@ -27,7 +27,7 @@ constexpr Index kFewestLags = 8;        // of a third of a part: two modes in on
 constexpr double kAboveNoise = 1.5;     // times its power: what stands out of its spectrum
 constexpr double kLeastMotion = 1e-10;  // of a channel, relative to its mean
 
-/// Below it lies nearly all that the channels' velocities do beyond noise, rad/s (Welch 1967).
+/// Frequency below which nearly all of the velocities beyond noise lie, rad/s (Welch 1967).
 double band_of(const std::vector<MatrixXd>& grids, double step, const VectorXd& noise) {
   Index longest = 0;
   for (const MatrixXd& grid : grids) longest = std::max(longest, grid.cols());

@@ -39,7 +39,7 @@ class AmbientCorrelations {
   double step = 0;                   ///< between lags, s
   std::vector<Eigen::Index> delays;  ///< of the rows and columns of their Hankel matrix, steps
   double duration = 0;               ///< of the longest record, s
-  std::vector<SteadyLine> hums;      ///< taken away from the records before
+  std::vector<SteadyLine> hums;      ///< removed from the records before
 
  private:
   void shorten(Eigen::Index lags);

@@ -20,7 +20,7 @@ Index usual_cells(std::size_t records) {
 
 constexpr Index kEnd = 10;  // part of a record at its end, where it rests
 constexpr Index kStretchesHeard = 50, kLeastHeard = 20;  // of a record, and samples of it
-// Squares of what is heard, in units of the noise: not quite white, and beyond chance.
+// Squares of audible motion, in units of the noise: not quite white, and beyond chance.
 constexpr double kMuchNoise = 1.5, kSurely = 5;
 constexpr double kWindowsOfWidth = 1.5;  // as many windows tell the least singular values
 constexpr double kQuiet = 0.9, kQuietDeviations = 1.645;  // share of normal noise within them
@@ -143,7 +143,7 @@ VectorXd first_noise(const std::vector<MotionRecord>& records, VectorXd* steps) 
     // Pushes are in the last tenth.
     constexpr double kGain = 15.874507866387544;  // root of the coefficients' squares, 252
     const double size = quantile(std::move(differences), kQuiet) / kQuietDeviations / kGain;
-    // Differences see motion where samples are far apart. Digits are no closer than the least step.
+    // Differences of samples far apart contain motion. Digits are at least the least step apart.
     const double seen = hankel < size / 2 ? hankel : size;
     const double digit = std::isfinite(quantum) ? quantum / std::sqrt(12.0) : 0;
     noise[c] = std::max({seen, digit, kDigits * largest, kTiny});

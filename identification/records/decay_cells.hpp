@@ -4,7 +4,7 @@
 namespace dashpot::identification {
 
 /// A first estimate of each channel's noise, from fifth differences of neighbouring samples, which
-/// leave little of a slow motion. Too large where samples are far apart.
+/// remove slow motion. Too large if samples are far apart.
 Eigen::VectorXd first_noise(const std::vector<MotionRecord>& records,
                             Eigen::VectorXd* steps = nullptr);
 
@@ -16,16 +16,16 @@ double typical_step(const std::vector<MotionRecord>& records);
 /// each point.
 Eigen::MatrixXd on_grid(const MotionRecord& record, double step, Eigen::MatrixXd* widths = nullptr);
 
-/// Where the motion of channels x points about their end is lost in noise.
+/// The point from which the motion of channels x points about their end is lost in noise.
 Eigen::Index audible(const Eigen::MatrixXd& grid, const Eigen::VectorXd& noise);
 
 /// Records in few evenly spaced cells, each the mean of the samples in a stretch of time: a sum of
 /// decays stays one, with the same eigenvalues, and the noise falls.
 class DecayCells {
  public:
-  /// Up to where the motion of all channels is `lost`, at least their noise. Cells are short enough
-  /// for the fastest motion; where this takes more than about `most` cells of all records, they are
-  /// those of the beginnings. 0: cells are as long as it comes, for a first estimate.
+  /// Up to the point at which the motion of all channels is `lost`, at least their noise. Cells are
+  /// short enough for the fastest motion; if this takes more than about `most` cells of all
+  /// records, only the beginnings are covered. 0: cells of any length, for a first estimate.
   DecayCells(const std::vector<MotionRecord>& motions, const Eigen::VectorXd& sample_noise,
              const Eigen::VectorXd& lost, Eigen::Index most);
 

@@ -26,9 +26,9 @@ constexpr Index kLagsOfPeriod = 8;    // part of it over which velocities are di
 constexpr Index kFewestBlocks = 20;   // of a period: fewer do not show that motion lasts
 constexpr double kLasting = 0.9;   // share of the blocks of motion that lasts with motion in them
 constexpr double kFaded = 0.01;    // of the median energy: a block without motion
-constexpr double kOutburst = 100;  // times the median: what fades from there is no lasting motion
+constexpr double kOutburst = 100;  // times the median: motion that fades from there does not last
 // Motion under irregular forces looks alike backwards: its energy rises as often as it falls. After
-// a push it falls for long, and rises at once.
+// a push the energy falls for long, and rises at once.
 constexpr double kRisesOften = 0.33;  // share of the blocks
 constexpr double kKeepsSize = 10;     // most by which its energy changes from third to third
 // A cycle's amplitude stays, within this share, in the second half of a record; a mode that did so
@@ -81,7 +81,8 @@ MatrixXd cycle_columns(double w, Index from, Index count) {
   return columns;
 }
 
-/// How a cycle of `w` (rad a sample) fits samples x channels: amplitudes, and squares left over.
+/// The fit of a cycle of `w` (rad a sample) to samples x channels: amplitudes, and residual
+/// squares.
 struct CycleFit {
   MatrixXd amplitude;
   double rest = 0, motion = 0;
@@ -115,8 +116,7 @@ bool cycles(const MatrixXd& scaled, double step, MotionVerdict& verdict) {
   if (w * static_cast<double>(half) < kFewestPeriods * 2 * std::numbers::pi ||
       w > std::numbers::pi / 2)
     return false;
-  // The frequency that leaves least over is searched in a part of the samples, so that many
-  // samples cost no more.
+  // The frequency with the least residual is searched in a part of the samples, to bound the time.
   const Index stride =
       std::max<Index>(1, static_cast<Index>(std::numbers::pi / (2 * w * (kHarmonics + 1))));
   const MatrixXd few = late(Eigen::seqN(0, half / stride, stride), Eigen::all);

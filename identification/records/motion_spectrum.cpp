@@ -28,7 +28,7 @@ Index smooth_count(Index samples) {
 
 VectorXd difference_power(const VectorXd& samples) {
   Index N = samples.size() - 1;
-  while (smooth_count(N) != N) ++N;  // of which a fast Fourier transform is fast
+  while (smooth_count(N) != N) ++N;  // a length with a fast Fourier transform
   Eigen::FFT<double> fft;
   VectorXcd lines;
   VectorXd differences = VectorXd::Zero(N);
@@ -62,7 +62,7 @@ double band_of_motion(const MatrixXd& grid, double step, const VectorXd& noise, 
   double band = 0;
   for (Index c = 0; c < grid.rows(); ++c) {
     VectorXd rising = grid.row(c).transpose().array() - grid(c, grid.cols() - 1);
-    rising.head(onset.size()).array() *= onset;  // what begins at once has all frequencies
+    rising.head(onset.size()).array() *= onset;  // a sudden begin has all frequencies
     const VectorXd power = difference_power(rising);
     const double width = std::numbers::pi / (static_cast<double>(power.size() + 1) * step);
     for (Index from = 0; from + lines <= power.size(); from += lines) {

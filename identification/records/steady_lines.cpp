@@ -17,7 +17,7 @@ namespace {
 constexpr Index kNear = 30;          // bins of the spectrum to each side
 constexpr Index kLeak = 3;           // bins to each side that a line leaks into
 constexpr Index kNeeded = 16;        // times kNear: samples in which a line is looked for
-constexpr double kOfBin = 1e-3;      // to which its frequency is searched
+constexpr double kOfBin = 1e-3;      // precision of its frequency
 constexpr double kOutstanding = 20;  // times their median
 constexpr Index kSteadyParts = 8;
 constexpr double kSteady = 0.7;      // of irregular motion, two in ten thousand reach it
@@ -135,7 +135,7 @@ std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step, bool of_d
     const VectorXcd turns = turning(w, step, grid.cols());
     MatrixXd waves(grid.cols(), 2);
     waves << turns.real(), turns.imag();
-    // Tapered: where a record begins and ends, other motion looks like the line.
+    // Tapered, because at the ends of a record other motion looks like the line.
     const MatrixXd weighted = taper_of(grid.cols()).matrix().asDiagonal() * waves;
     const MatrixXd shares =
         (weighted.transpose() * waves).ldlt().solve(weighted.transpose() * scaled.transpose());

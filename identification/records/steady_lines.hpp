@@ -11,15 +11,15 @@ struct SteadyLine {
   Eigen::VectorXcd size;  ///< of the channels: real part of size exp(i frequency t) is the motion
 };
 
-/// Takes the steady lines away from the samples in `grid`, channels x samples `step` s apart.
+/// Removes the steady lines from the samples in `grid`, channels x samples `step` s apart.
 ///
-/// A line stands out from the spectrum near it, and its phase in eight parts of the record is that
-/// of one sinusoid; that of a mode under irregular forces wanders. Of decays it has to be small and
-/// of one amplitude in the second half, where modes fade.
+/// A line stands out from the spectrum near it, and its phase in eight parts of the record fits one
+/// sinusoid; the phase of a mode under irregular forces wanders. In decays the line has to be small
+/// and of one amplitude in the second half, where modes fade.
 std::vector<SteadyLine> take_steady_lines(Eigen::MatrixXd& grid, double step,
                                           bool of_decays = false);
 
-/// Takes hums away from a record of decays, at the times of its samples.
+/// Removes hums from a record of decays, at the times of its samples.
 std::vector<SteadyLine> take_hums(MotionRecord& record);
 
 }  // namespace dashpot::identification

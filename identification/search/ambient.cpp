@@ -14,12 +14,12 @@
 namespace dashpot::identification {
 namespace {
 
-/// Of the models without some part: a pole that may be the same (relative distance, modal assurance
-/// criterion). What a part moves further is another one.
+/// A pole in a model without some part is the same up to this (relative distance, modal assurance
+/// criterion).
 constexpr double kSamePole = 0.3, kSameShape = 0.5;
-/// Two modes a channel, and two of what else the forces prefer; more order by order takes long.
+/// Two modes a channel, and two that the forces prefer; more orders take long.
 constexpr int kOrdersOfChannel = 4, kMostOrders = 40;
-/// Student's 95 % quantile for 20 parts over that of the normal distribution.
+/// Student's 95 % quantile for 20 parts over the normal distribution's.
 constexpr double kStudent = 2.09 / 1.96;
 
 /// The motion of each pole at all lags: rows are channels by lags, a pair has two columns.
@@ -50,7 +50,7 @@ MatrixXd amplitudes_of(const MatrixXd& columns, const Correlations& correlations
   return columns.colPivHouseholderQr().solve(right);
 }
 
-/// Returns what a model of `order` of some correlations leaves of others.
+/// Returns the residual of other correlations under a model of `order` of some.
 double left_over(const Realization& model, int order, const Correlations& own,
                  const Correlations& other, double step) {
   const std::vector<RealizedPole> poles = model.poles(order);
@@ -66,8 +66,8 @@ double left_over(const Realization& model, int order, const Correlations& own,
   return sum;
 }
 
-/// The order with which each half of the segments says most about the other; `left` gets the share
-/// of the squares that it does not say.
+/// The order with which each half of the segments best predicts the other; `left` gets the share of
+/// the squares that it does not predict.
 int order_of(const AmbientCorrelations& data, int largest, double& left) {
   const Correlations even = data.mean([](std::size_t s) { return s % 2 == 0; });
   const Correlations odd = data.mean([](std::size_t s) { return s % 2 == 1; });

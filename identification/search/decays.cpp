@@ -19,8 +19,8 @@ namespace {
 constexpr double kCritical = 1e-9;  ///< of a frequency: closer eigenvalues have one shape
 /// Cells of all records, and of the shortest, beyond which the search is among the beginnings.
 constexpr double kSearched = 3000, kShortestSearched = 200;
-/// Noise, of the sensors' rounding: what is left over is its steps. Estimates of it scatter so
-/// much.
+/// Noise over the sensors' rounding: below this the residual consists of steps. Estimates of it
+/// scatter so much.
 constexpr double kRounds = 1.2;
 
 /// The shape of a factor's first eigenvalue, from its amplitudes.
@@ -69,8 +69,8 @@ MeasuredMode to_mode(const FoundModel& found, std::size_t k, Index at, const Vec
   return mode;
 }
 
-/// Adds to the variances what the next larger model thinks otherwise: whether there is one mode
-/// more is not known for sure, either.
+/// Adds the difference to the next larger model to the variances, because the number of modes is
+/// uncertain too.
 void doubt_order(const DecayFit& fit, const DecayFit& larger, std::vector<MeasuredMode>& modes) {
   for (std::size_t k = 0; k < modes.size(); ++k) {
     if (!fit.factors[k].pair) continue;
@@ -110,8 +110,8 @@ Identification describe(const FoundModel& found, const std::vector<MotionRecord>
   result.whiteness = found.fit.whiteness;
   result.poles = model_poles(found.by_order);
 
-  // The motion of each channel about its means, and what is left of it. Constants of the model
-  // are no rests where a slow decay cancels against them.
+  // The motion of each channel about its means, and its residual. The model's constants are not
+  // rest positions if a slow decay cancels against them.
   VectorXd scale = VectorXd::Zero(found.data.channels), rest = scale;
   const auto over = left_over(found.data, found.fit);
   for (std::size_t k = 0; k < over.size(); ++k) {

@@ -8,8 +8,8 @@
 namespace dashpot::identification {
 namespace {
 
-// Of what is left over.
-constexpr double kNotWhite = 2;   ///< whiteness: beyond it the rest is no noise of sensors
+// Of the residual.
+constexpr double kNotWhite = 2;   ///< whiteness: beyond it the residual is more than sensor noise
 constexpr double kMuch = 0.1;     ///< of the motion: more than the noise of inputs leaves over
 constexpr double kPoor = 0.01;    ///< of the motion: modes of one order may make up for as much
 constexpr double kLittle = 1e-3;  ///< of the motion: a model that several records share is right
@@ -18,38 +18,38 @@ constexpr double kLightly = 0.1;  ///< damping ratio: friction does not make suc
 constexpr double kBeside = 0.1;   ///< energy, of the strongest lightly damped: friction makes less
 // Of the records.
 constexpr double kFewestParts = 0.8;    ///< share that has a mode: fewer give no spread of it
-constexpr double kLeastRatio = 0.001;   ///< damping ratio: what something moves has less
-constexpr double kUndetermined = 0.05;  ///< relative deviation: more tells no mode from others
-constexpr double kUndeterminedInDecays = 0.06;  ///< more, because that of one decay is widened
+constexpr double kLeastRatio = 0.001;   ///< damping ratio: driven motion has less
+constexpr double kUndetermined = 0.05;  ///< relative deviation: beyond it the mode may be any
+constexpr double kUndeterminedInDecays = 0.06;  ///< more: one decay's is widened
 constexpr double kTurn = 2.5;     ///< rad from sample to sample: beyond pi it would be another one
 constexpr double kSeenTurn = 3;   ///< rad: about half a turn has to be in the record,
 constexpr double kSeenDecay = 1;  ///< or a decay to 1 / e
 // Energy, as a share of the motion.
 constexpr double kMostEnergy = 100;    ///< more is the difference of modes that cancel
 constexpr double kLeastEnergy = 1e-6;  ///< a thousandth of the size: no arm is so linear
-/// Other orders miss heavily damped modes, but no lightly damped one that is there.
+/// Other orders miss heavily damped modes, but no true lightly damped one.
 constexpr double kAloneWeak = 1e-3, kLightlyAloneWeak = 3e-3;
-constexpr double kCounts = 1e-3;  ///< less, rejected, says nothing of a model
+constexpr double kCounts = 1e-3;  ///< a weaker rejected mode does not discredit a model
 // Of modes beside each other.
 constexpr double kLikeShapes = 0.8;  ///< modal assurance criterion: shapes of one motion
 constexpr double kNextTo = 0.05;     ///< relative distance: a frequency changes so with its size
 constexpr double kLarger = 2;        ///< energy: of two alike the weaker one is the change
 constexpr double kTwice = 0.2, kTwiceDeviations = 4;  ///< distance of one mode found twice
-constexpr double kSure = 2;            ///< deviations: what is beyond is not by chance
-constexpr double kHarmonic = 3;        ///< of odd forces, as friction; sums tell even ones
-constexpr double kExplains = 5;        ///< energy, over a mode's: what is not linear is weaker
-constexpr double kCoincides = 0.002;   ///< relative: what is not linear moves larger modes, too
-constexpr double kHasHarmonics = 0.3;  ///< damping ratio: what is over at once has none
-constexpr double kWhite = 1.5;         ///< whiteness: below it the rest is noise, and all is told
+constexpr double kSure = 2;            ///< deviations: beyond it a difference is not by chance
+constexpr double kHarmonic = 3;        ///< of odd forces, such as friction; sums show even ones
+constexpr double kExplains = 5;        ///< energy, over a mode's: a nonlinearity is weaker
+constexpr double kCoincides = 0.002;   ///< relative: a nonlinearity moves larger modes, too
+constexpr double kHasHarmonics = 0.3;  ///< damping ratio: a fast decay has none
+constexpr double kWhite = 1.5;         ///< whiteness: below it the residual is noise
 
 bool not_white(const Evidence& e) {
   return e.records.whiteness > kNotWhite;
 }
 
-/// Whether a mode may be made up for friction, which makes of one mode others near it, heavily
-/// damped ones, and weak ones. Of driven motion the noise of inputs is left over, too. Rounding is
-/// no noise, either, but of a known size. Several records that agree, of which hardly anything is
-/// left over, have the mode.
+/// Whether a mode may imitate friction, which adds modes near a true one, heavily damped ones, and
+/// weak ones. The residual of driven motion contains the noise of inputs, too. Rounding is not
+/// white either, but of a known size. Several records that agree with hardly any residual confirm
+/// the mode.
 bool may_be_friction(const Evidence& e) {
   double most = 0;
   for (const MeasuredMode& mode : e.all) {
@@ -77,7 +77,7 @@ double distance(const MeasuredMode& a, const MeasuredMode& b) {
   return std::abs(a.eigenvalues[0] - b.eigenvalues[0]);
 }
 
-/// Whether a mode may be what is not linear in this other one, which is known itself.
+/// Whether a mode may be a nonlinearity of this other one, which is known itself.
 bool explains(const MeasuredMode& other, const MeasuredMode& mode) {
   return other.energy > kExplains * mode.energy && other.energy < kMostEnergy;
 }
@@ -113,9 +113,9 @@ bool always(const Evidence& /*evidence*/) {
 }
 
 constexpr auto kRules = std::to_array<Rule>({
-    {Stage::kHum, "hum", "a steady hum, taken away", always},
+    {Stage::kHum, "hum", "a steady hum, which was removed", always},
     {Stage::kNotRepeated, "not repeated",
-     "parts of the records have another, or none: not linear, or noise", always},
+     "parts of the records lack it: a nonlinearity or noise", always},
 
     {Stage::kParts, "few parts", "not there without some parts of the record",
      [](const Evidence& e) { return e.parts < kFewestParts; }},
@@ -125,28 +125,29 @@ constexpr auto kRules = std::to_array<Rule>({
      }},
 
     {Stage::kLeftOver, "friction, parts differ",
-     "parts of the records differ: it may be friction, or what else is not linear",
+     "parts of the records differ: it may be friction or another nonlinearity",
      [](const Evidence& e) { return e.records.differs && may_be_friction(e); }, true},
     {Stage::kLeftOver, "friction, much left",
-     "much is left over: it may be friction, or what else is not linear",
+     "the residual is large: it may be friction or another nonlinearity",
      [](const Evidence& e) { return e.records.unexplained > kMuch && may_be_friction(e); }, true},
     {Stage::kLeftOver, "friction",
-     "what is left over is no noise: it may be friction, or what else is not linear",
+     "the residual is not noise: it may be friction or another nonlinearity",
      may_be_friction, true},
-    {Stage::kLeftOver, "weaker than rest", "much weaker than what is left over",
+    {Stage::kLeftOver, "weaker than rest", "much weaker than the residual",
      [](const Evidence& e) {
        return e.mode.stability > 0 && e.records.kind == MotionKind::kDecays &&
               e.mode.energy < kOfRest * e.records.unexplained;
      }},
     {Stage::kLeftOver, "alone, weaker than rest",
-     "weaker than what is left over, and in no model of another order",
+     "weaker than the residual, and in no model of another order",
      [](const Evidence& e) {
        return e.mode.stability == 0 && e.mode.energy < e.records.unexplained;
      }},
     {Stage::kLeftOver, "alone, rounded",
-     "in no model of another order, and the sensors' steps are left over",
+     "in no model of another order, and the residual consists of the sensors' steps",
      [](const Evidence& e) { return e.mode.stability == 0 && e.records.rounded && not_white(e); }},
-    {Stage::kLeftOver, "alone, much left", "in no model of another order, and much is left over",
+    {Stage::kLeftOver, "alone, much left",
+     "in no model of another order, and the residual is large",
      [](const Evidence& e) {
        return e.mode.stability == 0 && !e.records.rounded && e.records.unexplained > kPoor;
      },
@@ -180,7 +181,7 @@ constexpr auto kRules = std::to_array<Rule>({
        return e.mode.stability == 0 &&
               e.mode.energy < (e.mode.damping_ratio < kLightly ? kLightlyAloneWeak : kAloneWeak);
      }},
-    {Stage::kMode, "too weak", "too weak to be told from what is not linear",
+    {Stage::kMode, "too weak", "too weak to distinguish from a nonlinearity",
      [](const Evidence& e) { return e.mode.energy < kLeastEnergy; }},
     {Stage::kMode, "change of a larger",
      "like a larger mode next to it: its frequency changes with its size",
@@ -211,7 +212,7 @@ constexpr auto kRules = std::to_array<Rule>({
        return e.mode.damping_ratio <= (free ? e.mode.damping_ratio_std : 0);
      }},
     {Stage::kMode, "harmonic",
-     "three times the frequency of a larger mode: not a mode, but what is not linear",
+     "three times the frequency of a larger mode: a nonlinearity, not a mode",
      [](const Evidence& e) {
        return beside(e, [&](const MeasuredMode& other) {
          const double multiple = kHarmonic * other.eigenvalues[0].imag();
@@ -220,7 +221,7 @@ constexpr auto kRules = std::to_array<Rule>({
        });
      }},
     {Stage::kMode, "sum",
-     "the sum of two eigenvalues of larger modes: not a mode, but what is not linear",
+     "the sum of two eigenvalues of larger modes: a nonlinearity, not a mode",
      [](const Evidence& e) {
        return beside(e, [&](const MeasuredMode& a) {
          return explains(a, e.mode) && beside(e, [&](const MeasuredMode& b) {
@@ -229,11 +230,11 @@ constexpr auto kRules = std::to_array<Rule>({
        });
      }},
 
-    // A model of a decay that is not linear explains it to its noise, with modes that no model of
-    // another order has; that of a linear one has fewer of those than others, or all of it is
-    // believed. What moves driven and ambient motion is left over, and its colour tells.
+    // A model of a nonlinear decay explains it to its noise, with modes that no model of another
+    // order has. The model of a linear decay has fewer such modes than others, or all of it is
+    // believed. In driven and ambient motion the excitation colours the residual.
     {Stage::kTogether, "alone, as half",
-     "in no model of another order, as half of this model or more",
+     "in no model of another order, like half of this model's modes or more",
      [](const Evidence& e) {
        const Believed now(e.all);
        return e.mode.stability == 0 && e.records.kind == MotionKind::kDecays && !now.whole &&
@@ -241,7 +242,7 @@ constexpr auto kRules = std::to_array<Rule>({
      },
      true},
     {Stage::kTogether, "alone, as most",
-     "in no model of another order, and most of this one is not believed",
+     "in no model of another order, and most modes of this one are not believed",
      [](const Evidence& e) {
        const Believed now(e.all);
        return e.mode.stability == 0 && e.records.kind != MotionKind::kDecays &&

@@ -17,11 +17,11 @@ namespace {
 constexpr double kMoves = 3;   // in units of the noise
 constexpr double kStrong = 5;  // worth a decay
 constexpr double kRise = 3;    // a new push
-// In periods of the motion's pace: what is slower by a few times still has one envelope.
+// In periods of the motion's pace: motion slower by a few times still has one envelope.
 constexpr double kStandstill = 1;  // within a motion
 constexpr double kEnvelope = 1.5;  // window
-// Times over which positions are compared, of which the first that shows a push counts: over short
-// ones fast motion shows, over long ones slow motion stands out of more noise.
+// Times over which positions are compared; the first that shows a push counts. Short ones show fast
+// motion, long ones show slow motion in more noise.
 constexpr std::array kLags = {0.025, 0.1, 0.4, 1.6};
 constexpr Index kLeast = 20;         // samples of a decay
 constexpr Index kRestPart = 10;      // part of an event at its end, where the arm rests
@@ -31,8 +31,8 @@ constexpr double kBegins = 1.5;      // times the least speed before it: a push
 // Where a decay may begin: points of its rise, and shares of what follows its peak.
 constexpr int kRisePoints = 6;
 constexpr std::array kAfterPeak = {0.0, 0.02, 0.05, 0.1, 0.2, 0.3};
-// Large motions are not linear, but what decays fast is seen in them only: what is left over is
-// worse by kMore (logarithm) than from the best start on, beyond kEnough of the motion.
+// Large motions are not linear, but only they show fast decays. A start is too early if its
+// residual exceeds the best start's by kMore (logarithm), beyond kEnough of the motion.
 constexpr double kEnough = 1e-3, kMore = 0.03;
 constexpr double kSeen = 8;  // times the noise: motion of a decay
 
@@ -54,7 +54,7 @@ VectorXd speed_of(const MatrixXd& grid, const VectorXd& noise, Index lag) {
   return speed;
 }
 
-/// The point from which an event may be free: the last at which its energy, or what stands for it,
+/// The point from which an event may be free: the last at which its energy, or an estimate of it,
 /// is at its top. The kinetic part is scaled so that both parts are equal on the whole.
 Index top_of_energy(const MatrixXd& grid, const VectorXd& size, Index from, Index to, Index lag) {
   const Index quiet = std::max<Index>(1, (to - from) / kRestPart);
@@ -104,7 +104,7 @@ void add_events(const VectorXd& speed, Index begin, Index end, Index window,
     }
     if (now < least) least = now, low = k;
     if (now > kRise * std::max(least, kMoves)) {
-      // Begins before the envelope says so, which looks ahead.
+      // Begins before the envelope, which looks ahead.
       Index rise = std::min(end - 1, low + window / 2);
       while (rise > low && speed[rise] > kBegins * least) --rise;
       events.push_back({start, peak, rise});
@@ -142,8 +142,8 @@ std::vector<Event> find_events(const VectorXd& speed, double period) {
   return events;
 }
 
-/// Slow motion goes on where its speed is lost in noise, and what is at rest afterwards shows where
-/// the arm rests: ends each event by its positions, before the next one.
+/// Slow motion continues after its speed is lost in noise, and the samples at rest show the
+/// equilibrium: ends each event by its positions, before the next one.
 void extend(const MatrixXd& grid, const VectorXd& noise, std::vector<Event>& events) {
   for (std::size_t i = 0; i < events.size(); ++i) {
     auto& [begin, peak, end] = events[i];
@@ -169,8 +169,8 @@ VectorXd motion_of(const MotionRecord& record) {
   return motion;
 }
 
-/// Where the decay of an event begins: the earliest of some points from which a sum of decays
-/// explains it.
+/// The begin of an event's decay: the earliest of some points from which a sum of decays explains
+/// it.
 FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from, Index peak,
                    Index to) {
   FreeDecay decay{peak, to, {}};
@@ -181,9 +181,9 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
     starts.push_back(peak + static_cast<Index>(share * static_cast<double>(to - peak)));
   }
   starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
-  // Digits that do not change are no motion without noise.
+  // Digits that do not change do not mean motion without noise.
   const VectorXd enough = (kEnough * motion_of(part_of(record, from, to))).cwiseMax(noise);
-  // Mean logarithm of what a model leaves over from a start on; none where too little follows.
+  // Mean logarithm of a model's residual from a start on; none if too little follows.
   const auto rest = [&](Index start) {
     if (to - start < kLeast) return std::numeric_limits<double>::infinity();
     try {

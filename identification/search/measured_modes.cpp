@@ -7,7 +7,7 @@ namespace dashpot::identification {
 
 namespace {
 
-// A pole is stable that the model of one order less has within these; users know them.
+// A pole is stable if the model of one order less has it within these; see ModelPole.
 constexpr double kStableFrequency = 0.01, kStableRatio = 0.02, kStableShape = 0.95;
 // A model of another order has a mode within these: relative, deviations, and likeness.
 constexpr double kHasIt = 0.05, kHasItDeviations = 2, kHasItShape = 0.9;
@@ -54,7 +54,7 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
   }
 }
 
-/// The modes with the reasons that a stage finds; what it says of one changes nothing for others.
+/// The modes with the reasons that a stage finds; each mode is weighed independently.
 std::vector<MeasuredMode> weighed(Stage stage, const std::vector<MeasuredMode>& modes,
                                   const RecordFacts& records) {
   std::vector<MeasuredMode> result = modes;

@@ -8,7 +8,7 @@
 
 namespace dashpot::identification {
 
-/// A hum that was taken away, as a mode that is not believed.
+/// A removed hum, as a mode that is not believed.
 MeasuredMode to_mode(const SteadyLine& hum);
 
 /// The eigenvalues of models of rising order, from order 1, and whether each is stable.
@@ -18,8 +18,8 @@ std::vector<ModelPole> model_poles(const std::vector<std::vector<RealizedPole>>&
 double stability_of(const MeasuredMode& mode,
                     const std::vector<std::vector<RealizedPole>>& by_order, int order);
 
-/// Makes overdamped modes of single eigenvalues of like shapes, and sorts out what is not to be
-/// believed (doubts.hpp); modes with a reason are not, and have one already.
+/// Makes overdamped modes of single eigenvalues of like shapes, and rejects doubtful modes
+/// (doubts.hpp); modes that already have a reason are rejected too.
 void judge(std::vector<MeasuredMode> modes, const RecordFacts& records, Identification& result);
 
 }  // namespace dashpot::identification

@@ -10,27 +10,27 @@
 namespace dashpot::identification {
 namespace {
 
-/// A change of the model is given up where -2 log likelihood will stay larger by this. With 60,
+/// A change of the model is given up if -2 log likelihood will stay larger by this. With 60,
 /// searches among heavily damped modes give up models that become the best ones.
 constexpr double kDifference = 300;
-/// Radians of a record: what is slower is a constant; and as an exponent, what grows faster.
+/// Radians of a record: slower motion is a constant; and exponent of growth that is too fast.
 constexpr double kConstant = 0.3, kGrows = 3;
 constexpr double kSameCandidate = 0.1;  ///< relative distance: a fit makes one of them
 /// The logarithms of the frequencies of the halves of a factor that is split, about its own; they
-/// have to differ for a fit to part them. Less damped ones that look like one are told apart.
+/// have to differ for a fit to separate them. Less damped modes are found without a split.
 constexpr double kApart = 0.15, kDamped = 0.3;
 constexpr double kSurelyThere = 0.02;  ///< relative deviation of a factor that need not be tried
-constexpr double kCancels = 30;        ///< energy of what cancels, of all motion
+constexpr double kCancels = 30;        ///< energy of cancelling factors, of all motion
 constexpr int kUntangling = 40;        ///< iterations: the start is far away
 constexpr int kAddedAgain = 4;         ///< factors, in place of those that cancelled
 /// Shares of the search that are done when factors are added, split, and dropped, for progress.
 constexpr double kAdding = 0.6, kSplitting = 0.7, kDropping = 0.8;
 
-/// Takes these factors for those of the model, if they explain the cells better.
+/// Replaces the model's factors by these, if they explain the cells better.
 bool change(Search& search, const std::vector<DecayFactor>& factors) {
   DecayFit& fit = search.found.fit;
   std::optional<DecayFit>& larger = search.found.larger;
-  // A larger model that is not worth it may still say something, if it fits better.
+  // A larger model that is not worth it is still of use, if it fits better.
   const double before = fit.criterion - parameter_penalty(fit, search.found.data);
   DecayFit there = fit_decays(search.found.data, factors, fit.noise, search.limits.iterations,
                               before + kDifference);
@@ -45,7 +45,7 @@ bool change(Search& search, const std::vector<DecayFactor>& factors) {
   return false;
 }
 
-/// Factors of what is left over in the cells.
+/// Factors of the residual in the cells.
 std::vector<DecayFactor> candidates(const Search& search) {
   const FoundModel& found = search.found;
   std::vector<MatrixXd> rest;
@@ -102,7 +102,7 @@ bool drop_one(Search& search) {
   return false;
 }
 
-/// Factors that cancel against each other are where a search got lost: begins again without them.
+/// Removes factors that cancel against each other, a sign of a lost search, and begins again.
 void untangle(Search& search) {
   const DecayData& data = search.found.data;
   DecayFit& fit = search.found.fit;
@@ -147,7 +147,7 @@ bool add_from_rest(Search& search) {
   return false;
 }
 
-/// Two heavily damped modes near each other look like one, and what is left over does not show it.
+/// Two heavily damped modes near each other look like one, and the residual does not show it.
 bool split_one(Search& search) {
   const std::vector<DecayFactor>& whole = search.found.fit.factors;
   for (std::size_t k = 0; k < whole.size(); ++k) {

@@ -1,4 +1,4 @@
-// Compares parts of the records with the model of the whole, and says how sure that is.
+// Compares parts of the records with the model of the whole, with deviations.
 #include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/search/model_parts.hpp>
@@ -16,7 +16,7 @@ namespace {
 constexpr std::array<std::pair<double, double>, 3> kWindows = {
     std::pair(0.0, 0.5), {0.1, 1.0}, {0.25, 1.0}};
 constexpr double kColoured = 2;    ///< whiteness above which copies of modes are doubted
-constexpr double kWeak = 0.05;     ///< energy, of the strongest: its deviation says enough
+constexpr double kWeak = 0.05;     ///< energy, of the strongest: its deviation suffices
 constexpr double kCopies = 0.15;   ///< of the logarithm of a frequency
 constexpr double kAlike = 0.8;     ///< modal assurance criterion
 constexpr double kDeviations = 3;  ///< by which an estimate may be off by chance
@@ -27,8 +27,8 @@ constexpr double kSame = 0.05, kSameRatio = 0.15;
 constexpr double kAtRest = 1e-9;     ///< of the motion: less are digits of a channel at rest
 constexpr double kOfOneDecay = 1.4;  ///< factor on deviations; of several it shows in the records
 
-/// By how much a model's factors differ in parts of the records: in their beginnings, their ends,
-/// and each of several records.
+/// Differences of a model's factors in parts of the records: their beginnings, their ends, and each
+/// of several records.
 std::vector<DecayStep> steps_of_parts(const Search& search, const DecayFit& whole) {
   std::vector<DecayStep> steps;
   const auto add = [&](const std::vector<MotionRecord>& records,
@@ -60,7 +60,7 @@ std::size_t contradicted(const Search& search, const DecayFit& whole,
                          std::vector<std::array<double, 2>>& shown) {
   const std::vector<DecayStep> parts = steps_of_parts(search, whole);
   shown.assign(whole.factors.size(), {});
-  // Where what is left over is no noise, no difference comes by chance.
+  // If the residual is not noise, no difference comes by chance.
   const double chance = whole.whiteness > kColoured ? 0 : kDeviations * kDeviations;
   std::size_t worst = whole.factors.size();
   double most = 1, strongest = 0;
@@ -124,8 +124,8 @@ std::size_t copy_in(const DecayData& data, const DecayFit& whole) {
   return whole.factors.size();
 }
 
-/// Where parts differ, or what is left over is no noise, models of other orders differ, too: how
-/// they do is part of the deviations.
+/// If parts differ or the residual is not noise, models of other orders differ, too: adds their
+/// spread to the deviations.
 void add_spread_of_orders(Search& search) {
   const std::vector<DecayFactor>& factors = search.found.fit.factors;
   for (std::size_t k = 0; k < factors.size(); ++k) {
@@ -155,7 +155,7 @@ void keep_repeated(Search& search) {
   const auto contradicts = [&](const DecayFit& whole) {
     return contradicted(search, whole, search.found.scatter);
   };
-  // Motion that no model explains is not noise, and looks like a mode near another one.
+  // Unexplained motion is not noise, and looks like a mode near another one.
   const bool copied =
       std::max(search.colour, fit.whiteness) > kColoured && copy_in(data, fit) < fit.factors.size();
   if (contradicts(fit) == fit.factors.size() && !copied) {

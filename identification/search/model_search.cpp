@@ -15,7 +15,7 @@ namespace dashpot::identification {
 namespace {
 
 constexpr SearchLimits kOfDecays{.rows = 300, .worse = 6, .iterations = 30, .added = 6};
-/// Of models of rising order in a first estimate, which nothing is added to.
+/// For models of rising order in a first estimate, to which nothing is added.
 constexpr SearchLimits kRough{.rows = 120, .worse = 3, .iterations = 4, .added = 0};
 /// A model of too small an order that has not settled loses to one of too large an order, whose
 /// surplus modes cancel. Decays that have cancel further with more; chirps need 60 iterations.
@@ -25,18 +25,18 @@ constexpr int kLastIterations = 30;     ///< on the samples as they are
 constexpr Index kSearchCells = 3000;
 constexpr std::size_t kMostSearched = 8;  ///< records
 constexpr std::size_t kWithProducts = 2;  ///< oscillations, of which the strongest products are
-/// In lengths of the record: a slower single decay is taken for drift, if one explains as much.
+/// In lengths of the record: a slower single decay counts as drift, if drift explains as much.
 constexpr double kDrifts = 3;
 /// Orders: of decays two for each channel, within these; with inputs so many more, at most; and of
 /// decays at most so many for each cell and channel.
 constexpr Index kLeastOrder = 12, kMostOrder = 32, kOrdersOfInputs = 16, kCellsOfOrder = 4;
-constexpr int kOrdersOfRest = 2;  ///< what is left over is looked at for one motion at a time
+constexpr int kOrdersOfRest = 2;  ///< the residual is searched for one motion at a time
 constexpr Index kBeginning = 8;   ///< part of the records, where fast decays are
 constexpr Index kRowsOfRest = 100, kColumnsOfRest = 10;  ///< of its Hankel matrix, most, and least
 constexpr int kSearchedOn = 4;       ///< factors more, for a model that is larger
 constexpr double kOrdersDone = 0.5;  ///< share of the search that is done then, for progress
 
-/// Poles of what is left over, of the whole and of the beginning, where fast decays are.
+/// Poles of the residual, of the whole and of the beginning, where fast decays are.
 std::vector<std::vector<RealizedPole>> rest_poles(const std::vector<MatrixXd>& rest, double step,
                                                   Index channels) {
   std::vector<std::vector<RealizedPole>> result;
@@ -55,7 +55,7 @@ std::vector<std::vector<RealizedPole>> rest_poles(const std::vector<MatrixXd>& r
   return result;
 }
 
-/// Poles with their shapes, from units of the noise to those of the channels.
+/// Converts poles with their shapes from units of the noise to units of the channels.
 std::vector<RealizedPole> in_units_of(const VectorXd& noise, std::vector<RealizedPole> poles) {
   for (RealizedPole& pole : poles) {
     pole.shape = pole.shape.cwiseProduct(noise.cast<Complex>()).normalized();
@@ -79,8 +79,7 @@ DecayFit with_products(const DecayData& data, const DecayFit& plain) {
   return fit_decays(data, factors, plain.noise, kProductIterations);
 }
 
-/// The search is among the records that move most: more of them say no more of how many modes there
-/// are.
+/// The search is among the records that move most: more records do not show more modes.
 std::vector<MotionRecord> strongest(const std::vector<MotionRecord>& records,
                                     const VectorXd& noise) {
   if (records.size() <= kMostSearched) return records;
@@ -164,7 +163,7 @@ void try_drift(Search& search) {
   }
 }
 
-/// Forgets a larger model that fits no better: nothing is learnt from it.
+/// Forgets a larger model that fits no better.
 void forget_useless_larger(FoundModel& found) {
   if (!found.larger) return;
   const double gained = found.larger->criterion - found.fit.criterion;
@@ -261,7 +260,7 @@ FoundModel find_model(const ExcitedCells& cells, const IdentifyOptions& options)
   while (factor_width(found.fit.factors) < 2 * channels - 1 && split_one(search)) {
     drop_useless(search);
   }
-  // A model that none larger was compared with is not known to be large enough.
+  // A model is only known to be large enough beside a larger one.
   for (int k = 0; k < kSearchedOn && !found.larger && add_from_rest(search); ++k) {
     drop_useless(search);
   }

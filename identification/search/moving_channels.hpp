@@ -8,7 +8,7 @@ namespace dashpot::identification {
 /// Throws std::invalid_argument for a largest order that is too large, or negative.
 void check_order(const IdentifyOptions& options);
 
-/// Records without the channels and the inputs that are constant in all of them, which say nothing.
+/// Records without the channels and inputs that are constant in all of them.
 struct MovingChannels {
   /// Throws std::invalid_argument if no channel moves.
   explicit MovingChannels(const std::vector<MotionRecord>& all);

@@ -175,7 +175,7 @@ TEST(IdentifyAmbient, AHumIsTakenAway) {
   const auto hums = [](const Identification& result) {
     std::vector<double> frequencies;
     for (const MeasuredMode& mode : result.rejected) {
-      if (mode.reason == "a steady hum, taken away") {
+      if (mode.reason == "a steady hum, which was removed") {
         frequencies.push_back(mode.natural_frequency);
       }
     }

@@ -101,7 +101,7 @@ TEST(DisturbedDecays, AHumIsTakenAwayAndMakesNoAmbientMotion) {
     expect_two(found, 2e-3);
     ASSERT_FALSE(found.rejected.empty());
     EXPECT_NEAR(found.rejected.back().natural_frequency, 100 * std::numbers::pi, 0.1);
-    EXPECT_EQ(found.rejected.back().reason, "a steady hum, taken away");
+    EXPECT_EQ(found.rejected.back().reason, "a steady hum, which was removed");
   }
 }
 

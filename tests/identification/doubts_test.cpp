@@ -288,8 +288,8 @@ TEST(Doubts, OfWhatIsNotAModeHaveWords) {
   MeasuredMode hum, other;
   weigh(Stage::kHum, {hum}, hum);
   weigh(Stage::kNotRepeated, {other}, other);
-  EXPECT_EQ(hum.reason, "a steady hum, taken away");
-  EXPECT_EQ(other.reason, "parts of the records have another, or none: not linear, or noise");
+  EXPECT_EQ(hum.reason, "a steady hum, which was removed");
+  EXPECT_EQ(other.reason, "parts of the records lack it: a nonlinearity or noise");
 }
 
 }  // namespace

@@ -165,9 +165,9 @@ TEST(MeasuredModes, OfADecayThatOneOrderAloneHasAreBelievedAmongMoreThatAllHave)
   };
   EXPECT_EQ(at(3, 2, true), "");
   EXPECT_EQ(at(0, 4, false), "");  // nothing else in the model
-  EXPECT_THAT(at(2, 2, true), StartsWith("in no model of another order, as half of this"));
+  EXPECT_THAT(at(2, 2, true), StartsWith("in no model of another order, like half of this"));
   EXPECT_EQ(at(2, 2, true, 1e-7), "");  // too weak to count
-  EXPECT_THAT(at(0, 1, true), StartsWith("in no model of another order, as half of this"));
+  EXPECT_THAT(at(0, 1, true), StartsWith("in no model of another order, like half of this"));
 }
 
 TEST(MeasuredModes, OfDecaysMayBeLessSureButHaveToDecay) {
