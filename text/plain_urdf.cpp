@@ -15,8 +15,8 @@
 namespace dashpot::text {
 namespace {
 
-/// Returns what makes a text a xacro that was not expanded: an element or an expression of it
-/// outside comments; "" if nothing does. (The name space alone may stay behind in an expanded one.)
+/// Returns the element or expression outside comments by which a text is an unexpanded xacro; "" if
+/// there is none. (An expanded xacro may keep the name space.)
 std::string xacro_sign(std::string_view text) {
   std::size_t at = 0;
   while ((at = text.find_first_of("<$", at)) != std::string_view::npos) {
@@ -77,7 +77,7 @@ std::string rpy_of(const std::array<double, 4>& quaternion) {
   return text.data();
 }
 
-/// Writes what it is told of a description, but for what nobody needs.
+/// Writes the parts of a description that the mechanics of a chain need.
 class PlainWriter {
  public:
   explicit PlainWriter(PlainUrdf& result) : result_(result) {
@@ -95,7 +95,7 @@ class PlainWriter {
     if (tag.ends) kept_[tag.depth] = false;
   }
 
-  /// Name of the first element if that is no robot; "" otherwise.
+  /// Name of the first element unless it is a robot; "" otherwise.
   const std::string& stranger() const { return stranger_; }
   bool any_robot() const { return robot_; }
 
@@ -201,7 +201,7 @@ class PlainWriter {
     return rpy_of(q);
   }
 
-  /// Writes what a limit lacks: of a joint that nobody asks for it does not matter.
+  /// Writes the values that a limit lacks; they do not matter for a joint that is not used.
   void complete(const XmlTag& tag) {
     for (const char* name : {"effort", "velocity"}) {
       if (has(tag, name)) continue;

@@ -14,15 +14,15 @@ struct MotionLimits {
   double jerk = std::numeric_limits<double>::infinity();
 };
 
-/// A URDF as a parser of version 1.0 reads it, and what this version has no place for.
+/// A URDF as a parser of version 1.0 reads it, and the data that this version lacks.
 struct PlainUrdf {
   std::string text;
   std::map<std::string, MotionLimits, std::less<>>
       limits;  ///< by joint; only those that are stated
-  /// By joint, what its limit lacks though URDF asks for it: "effort", "velocity" or both, which
-  /// are 0 in `text`.
+  /// By joint, the required values that its limit lacks: "effort", "velocity" or both, which are 0
+  /// in `text`.
   std::map<std::string, std::string, std::less<>> lacks;
-  /// By joint, the `rpy` of its origin where an angle is beyond a turn, as degrees are.
+  /// By joint, the `rpy` of its origin if an angle exceeds a turn, as degrees do.
   std::map<std::string, std::string, std::less<>> turns;
 };
 
@@ -30,8 +30,8 @@ struct PlainUrdf {
 /// nothing but what the mechanics of a chain need: shapes, materials, transmissions and extensions
 /// are left out unread. `quat_xyzw` of version 1.1 becomes `rpy`, exactly but for rounding. Throws
 /// std::runtime_error with the reason for other versions, for `quat_xyzw` in version 1.0, where
-/// other programs ignore it, for orientations that are no rotation, for limits that are not
-/// positive, and for MJCF, SDF and xacro, with the way on; `name` stands for the file there.
+/// other programs ignore it, for invalid rotations, for limits that are not positive, and for MJCF,
+/// SDF and xacro. Such a message names the next step and the file as `name`.
 PlainUrdf plain_urdf(std::string_view text, const std::string& name);
 
 }  // namespace dashpot::text

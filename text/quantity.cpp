@@ -76,8 +76,8 @@ bool multiply(std::string_view factor, int sign, Unit& unit) {
   return false;
 }
 
-/// Nothing if `text` is not a unit. What follows a '/' is a single factor, so that "N/m s", which
-/// could be read in two ways, is none.
+/// Nothing if `text` is not a unit. A single factor follows a '/', so that the ambiguous "N/m s" is
+/// rejected.
 std::optional<Unit> parse_unit(std::string_view text) {
   Unit unit;
   int sign = 1;
@@ -100,8 +100,8 @@ std::string quoted(std::string_view text) {
   return "'" + std::string(text.substr(0, kLongest)) + (text.size() > kLongest ? "...'" : "'");
 }
 
-/// The number at the beginning of `text`, which loses it; NaN or infinite for those and for what is
-/// too large; nothing if there is none.
+/// The number at the beginning of `text`, which is removed; may be NaN or infinite, as are numbers
+/// that are too large; nothing if there is none.
 std::optional<double> take_number(std::string_view& text) {
   static constexpr std::array<std::string_view, 12> kNotFinite = {
       ".nan",  ".NaN",  ".NAN",  ".inf",  ".Inf",  ".INF",

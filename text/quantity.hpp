@@ -15,7 +15,7 @@ namespace dashpot::text {
 double parse_quantity(std::string_view text, const std::string& unit);
 
 /// Throws std::invalid_argument if, among the entries of a list that are wanted in rad, one has a
-/// unit of its own and another, which is not zero, has none: nobody knows whether "0, -45, 90 deg"
+/// unit of its own and another, which is not zero, has none: it is unknown whether "0, -45, 90 deg"
 /// begins in degrees. `units` has one unit for each of `texts`.
 void refuse_mixed_angles(const std::vector<std::string>& texts,
                          const std::vector<std::string>& units);

@@ -36,9 +36,9 @@ void for_each_entry(const YamlMapping& keys, std::string_view key, const YamlNod
     const auto other = std::find_if(units.begin(), units.end(),
                                     [&](const std::string& unit) { return unit != units[0]; });
     throw keys.error(key,
-                     "is not a list, and the unit of entry 1 is " + units[0] + ", that of entry " +
-                         std::to_string(other - units.begin() + 1) + " is " + *other +
-                         "; a list of " + size + " is wanted",
+                     "is not a list, and the unit of entry 1 is " + units[0] +
+                         ", the unit of entry " + std::to_string(other - units.begin() + 1) +
+                         " is " + *other + "; a list of " + size + " is wanted",
                      node.line);
   }
   if (list && node.items.size() != units.size()) {

@@ -26,7 +26,7 @@ void read_text(const YamlMapping& keys, std::string_view key, std::string& value
 void read_switch(const YamlMapping& keys, std::string_view key, bool& value);
 /// A whole number from `lowest` to a million.
 void read_count(const YamlMapping& keys, std::string_view key, int lowest, int& value);
-/// A number in the range, or, unless `none` is NaN, the word none, which stands for it.
+/// A number in the range, or, unless `none` is NaN, the word none, which sets `none`.
 void read_number(const YamlMapping& keys, std::string_view key, const std::string& unit,
                  const Range& range, double& value, double none = kNoNone);
 /// units.size() such entries: a list, or one for all if they have the same unit.
@@ -38,7 +38,7 @@ void read_vector3(const YamlMapping& keys, std::string_view key, const std::stri
                   Eigen::Vector3d& value);
 
 /// units.size() rows: a list of rows (numbers in SI units), or the diagonal, as in read_numbers;
-/// `units` are those of the diagonal.
+/// `units` belong to the diagonal.
 void read_matrix(const YamlMapping& keys, std::string_view key, const Units& units,
                  Eigen::Ref<Eigen::MatrixXd> value);
 

@@ -50,7 +50,7 @@ class TreeBuilder : public YAML::EventHandler {
 
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     YamlNode& node = open(YamlNode::Kind::kNull, mark, anchor);
-    // The mark of a value that is not there is that of what follows: its key's line says more.
+    // The mark of a missing value points to the next token: use its key's line.
     const YamlNode* parent = open_.size() > 1 ? &open_[open_.size() - 2].node : nullptr;
     if (parent != nullptr && parent->kind == YamlNode::Kind::kMap &&
         parent->items.size() % 2 == 1) {

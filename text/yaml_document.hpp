@@ -17,7 +17,7 @@ struct YamlNode {
 /// The bytes of the file at `path`, or of standard input if it is "-". Throws InputError.
 std::string read_input(const std::string& path);
 
-/// Reads a file, but no pipes and devices, which may never end or keep the caller waiting.
+/// Reads a regular file; rejects pipes and devices, which may never end or keep the caller waiting.
 std::string read_regular_file(const std::string& path);
 
 /// Parses text that holds one YAML (or JSON) document. Throws InputError on anything else, and on

@@ -93,7 +93,7 @@ const BadConfig kBadConfigs[] = {
      "limits: {torque: [1, 2, 3, 4, 5, 6]}\n"},
     {"limits.torque: has 0 entries; a list of 7, or one number for all, is wanted (line 2)",
      "limits: {torque: []}\n"},
-    {"gains.task.stiffness: is not a list, and the unit of entry 1 is N/m, that of "
+    {"gains.task.stiffness: is not a list, and the unit of entry 1 is N/m, the unit of "
      "entry 4 is N m/rad; a list of 6 is wanted (line 2)",
      "gains: {task: {stiffness: 600, damping: 1}}\n"},
     {"gains.task.stiffness: has 3 entries; a list of 6 is wanted (line 2)",
