@@ -37,8 +37,8 @@ struct ContactLimit {
 
 /// The least damped motion at one stiffness of a touch.
 struct ContactPoint {
-  double stiffness;      ///< k, N/m
-  double damping_ratio;  ///< -Re(log z) / |log z|, the least; negative if the loop is unstable
+  double stiffness;          ///< k, N/m
+  double damping_ratio;      ///< -Re(log z) / |log z|, the least; negative if the loop is unstable
   double natural_frequency;  ///< |log z| / T of that motion, rad/s
 };
 

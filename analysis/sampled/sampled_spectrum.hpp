@@ -64,10 +64,10 @@ struct SampledMode {
 struct SampledSpectrum {
   std::vector<SampledMode> modes;   ///< with the indices of the continuous modes they come from
   std::vector<Complex> zero_modes;  ///< z of the velocities along the zero modes that are damped
-  std::vector<Complex> memory;  ///< z of the m states of SampledLoop::memory, nearest to the
-                                ///< eigenvalues of state - position K^-1 output, the motion at
-                                ///< rest; one more if a pair would be torn
-  std::vector<Complex> others;  ///< z of the loop's own memory: delay, filter, last position
+  std::vector<Complex> memory;      ///< z of the m states of SampledLoop::memory, nearest to the
+                                    ///< eigenvalues of state - position K^-1 output, the motion at
+                                    ///< rest; one more if a pair would be torn
+  std::vector<Complex> others;      ///< z of the loop's own memory: delay, filter, last position
   /// Largest |z| except for z = 1 of the zero modes: of their positions, and of their undamped
   /// velocities. The loop is stable if it is below 1.
   double spectral_radius = 0;

@@ -114,8 +114,8 @@ bool always(const Evidence& /*evidence*/) {
 
 constexpr auto kRules = std::to_array<Rule>({
     {Stage::kHum, "hum", "a steady hum, which was removed", always},
-    {Stage::kNotRepeated, "not repeated",
-     "parts of the records lack it: a nonlinearity or noise", always},
+    {Stage::kNotRepeated, "not repeated", "parts of the records lack it: a nonlinearity or noise",
+     always},
 
     {Stage::kParts, "few parts", "not there without some parts of the record",
      [](const Evidence& e) { return e.parts < kFewestParts; }},
@@ -131,8 +131,8 @@ constexpr auto kRules = std::to_array<Rule>({
      "the residual is large: it may be friction or another nonlinearity",
      [](const Evidence& e) { return e.records.unexplained > kMuch && may_be_friction(e); }, true},
     {Stage::kLeftOver, "friction",
-     "the residual is not noise: it may be friction or another nonlinearity",
-     may_be_friction, true},
+     "the residual is not noise: it may be friction or another nonlinearity", may_be_friction,
+     true},
     {Stage::kLeftOver, "weaker than rest", "much weaker than the residual",
      [](const Evidence& e) {
        return e.mode.stability > 0 && e.records.kind == MotionKind::kDecays &&
@@ -220,8 +220,7 @@ constexpr auto kRules = std::to_array<Rule>({
                 coincides(e.mode, std::abs(e.mode.eigenvalues[0].imag() - multiple), multiple);
        });
      }},
-    {Stage::kMode, "sum",
-     "the sum of two eigenvalues of larger modes: a nonlinearity, not a mode",
+    {Stage::kMode, "sum", "the sum of two eigenvalues of larger modes: a nonlinearity, not a mode",
      [](const Evidence& e) {
        return beside(e, [&](const MeasuredMode& a) {
          return explains(a, e.mode) && beside(e, [&](const MeasuredMode& b) {
