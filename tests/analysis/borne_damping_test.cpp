@@ -1,5 +1,5 @@
-// What a mode bears, beside gain margins from the eigenvalues of the loop, and the design at set-up
-// time, which searches.
+// The damping that a mode tolerates, beside gain margins from eigenvalues of the loop, and beside
+// the search of the design at set-up time.
 #include <dashpot/analysis/borne_damping.hpp>
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/analysis/ratio_damping.hpp>
@@ -102,9 +102,8 @@ TEST(BorneDamping, IsContinuous) {
   }
 }
 
-/// Springs that are in force in part bear the same part of the damping, so that parts of several
-/// springs that make up one bear no more than one; and without springs any damping keeps the
-/// margin.
+/// Partly active springs tolerate the same part of the damping, so that parts of several springs
+/// that add up to one tolerate no more than one. Without springs any damping keeps the margin.
 TEST(BorneDamping, GivesAPartOfTheSpringsItsPart) {
   Random random(4103);
   for (int k = 0; k < 100; ++k) {
@@ -138,7 +137,8 @@ TEST(BorneDamping, RefusesWhatIsNoLoop) {
   }
 }
 
-/// The level of the design at set-up time lowers all modes to what the worst one bears.
+/// The level of the design at set-up time lowers all modes to the level that the worst mode
+/// tolerates.
 TEST(BorneDamping, AgreesWithTheSearchOfTheDesign) {
   Random random(4104);
   int lowered = 0;

@@ -147,7 +147,7 @@ std::vector<PathFamily> families() {
   return all;
 }
 
-/// What was published: discs of eigenvalues, and how many eigenvalues it does not speak of.
+/// The published discs of eigenvalues, and the number of eigenvalues without one.
 struct Published {
   std::vector<testing::LongComplex> center;
   std::vector<long double> radius;

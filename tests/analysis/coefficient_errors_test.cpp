@@ -1,5 +1,5 @@
-// What is not known of the coefficients is in the bounds: rounding errors beyond double-doubles,
-// matrices that are symmetric to 1e-10.
+// The bounds include errors of the coefficients: rounding errors beyond double-doubles, matrices
+// that are symmetric to 1e-10.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>

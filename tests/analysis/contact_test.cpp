@@ -1,5 +1,5 @@
-// What a sampled loop bears when it touches something: against closed forms, balls of Arb and
-// passive worlds drawn by chance.
+// Stability of a sampled loop in contact: against closed forms, balls of Arb and random passive
+// worlds.
 #include <dashpot/analysis/contact_limit.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/tests/support/proved_eigenvalues.hpp>
@@ -64,7 +64,7 @@ TEST(Contact, LimitIsThatOfOneJoint) {
     const double trace = 2 * std::cos(turn) - (1 - std::cos(turn)) * K / (M * low * low) -
                          std::sin(turn) * C / (M * low);
     const double angle = alternates ? std::numbers::pi : std::acos(0.5 * trace);
-    EXPECT_NEAR(found.frequency * T, angle, 1e-5);  // that of 1e-6 beyond
+    EXPECT_NEAR(found.frequency * T, angle, 1e-5);  // measured 1e-6 beyond the limit
     EXPECT_TRUE(found.stable_if_rigid);             // nothing moves
   }
 }
@@ -79,7 +79,7 @@ TEST(Contact, BeginsWhereTheLoopIsStableInTheAir) {
   EXPECT_TRUE(std::isinf(all.stiffness) && std::isinf(all.lower));
 }
 
-/// What the touch is softened and damped by: a limit that its damper lifts, to where none is left.
+/// A damper of the touch raises the limit, until there is none.
 TEST(Contact, ADamperOfTheWorldLiftsTheLimit) {
   const System<> system = one_joint(2, 300, 4000);
   SampledLoop loop;

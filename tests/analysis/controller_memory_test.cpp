@@ -76,7 +76,7 @@ TEST(ControllerMemory, BoundsTheGainMargin) {
     if (time < 0.2) {
       EXPECT_EQ(margin, 0);  // lower gains only make it worse
     } else {
-      EXPECT_NEAR(margin, 2 * 2 / (loop.period * 10), 40);  // that of the damper
+      EXPECT_NEAR(margin, 2 * 2 / (loop.period * 10), 40);  // the damper's margin
     }
   }
 }

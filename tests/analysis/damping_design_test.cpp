@@ -190,7 +190,7 @@ TEST(DampingDesign, StaysBoundedAndNamesSoftModesNextToASingularity) {
     }
   }
   EXPECT_GT(soft, 5);
-  EXPECT_GT(largest, 0.02 * bound);  // the bound is no idle one
+  EXPECT_GT(largest, 0.02 * bound);  // the bound is within a factor of 50
 }
 
 TEST(DampingDesign, RefusesWhatIsNoProblemOfDamping) {

@@ -62,7 +62,7 @@ TEST(DampingInLoop, HasTheMarginThatItClaims) {
   EXPECT_GT(given_up, 2);
 }
 
-/// Where the states are too many to solve for each trial.
+/// With too many states to solve for each trial.
 TEST(DampingInLoop, HoldsThroughManyTicksOfDelay) {
   Random random(6);
   const TaskImpedance arm = random_arm(random, 4, 3);

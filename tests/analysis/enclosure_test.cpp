@@ -1,5 +1,5 @@
-// What is proved from the residual of a basis encloses the truth, however bad the basis, and not by
-// much more than it has to: radii of blocks, discs of their eigenvalues.
+// Radii of blocks and discs of their eigenvalues, proved from the residual of a basis, enclose the
+// truth, however bad the basis, and are not much wider than necessary.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/spectrum/enclosure.hpp>
 #include <dashpot/analysis/spectrum/modes.hpp>
@@ -380,7 +380,7 @@ TEST(DiscRadius, IsHardlyMoreThanEigenvaluesMove) {
       EXPECT_LE(disc, (count == 2 ? 0.51 : 1.1) * share * gap) << share;
     }
   }
-  // Where eigenvalues are far apart it is proportional to the radius, and of a single one equal.
+  // It is proportional to the radius if eigenvalues are far apart, and equal for a single one.
   const std::array<Complex, 2> pair{Complex(-1, 2), Complex(-1, -2)};
   EXPECT_LE(disc_radius(pair.data(), 2, 0, 3.2, 1e-10), 1e-8);
   EXPECT_EQ(disc_radius(pair.data(), 1, 0, 3, 1e-9), 1e-9);

@@ -37,7 +37,7 @@ TEST(GainMargin, IsThatOfOneJoint) {
   }
 }
 
-/// The first margin of several, where squares of the damping are no numbers any more.
+/// The first margin of several, with damping whose squares overflow.
 TEST(GainMargin, IsTheFirstWhereAnEnergyIsNoNumber) {
   const double d = 1e158, T = 1e10;
   const MatrixXd unit = MatrixXd::Identity(2, 2);
@@ -88,7 +88,7 @@ TEST(GainMargin, IsThatOfOneJointWithFriction) {
   EXPECT_GT(finite, 40);
 }
 
-/// A spring of the world that pushes away asks for more stiffness, which is no margin.
+/// A spring of the world that pushes away needs more stiffness, so that there is no margin.
 TEST(GainMargin, IsZeroIfOnlyMoreHelps) {
   const System<> system = one_joint(1, 300, -1000);
   SampledLoop loop;

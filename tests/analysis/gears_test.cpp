@@ -1,4 +1,4 @@
-// Gears that bend, in joint coordinates: what is refused, and what a design leaves of its ratio.
+// Elastic joints in joint coordinates: refusals, and the level of a damping design.
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/analysis/gears.hpp>
 #include <dashpot/analysis/spectrum.hpp>
@@ -69,7 +69,7 @@ GearedJoints geared_joints(bool link) {
   return result;
 }
 
-// The margin of a design with gears in joint coordinates is that of the loop with its motors.
+// A design with gears in joint coordinates has the margin of the loop with its motors.
 TEST(Gears, LowerADesignToWhatTheLoopBears) {
   const DampingTarget target = DampingTarget::constant(0.7);
   for (const bool link : {false, true}) {

@@ -1,5 +1,4 @@
-// Eigenvalues by the double-shift QR iteration, beside known ones and those of Eigen in long
-// double.
+// Eigenvalues by the double-shift QR iteration, beside known ones and Eigen's in long double.
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -18,8 +17,8 @@ using Eigen::VectorXd;
 using testing::LongComplex;
 using testing::Random;
 
-/// Expects the eigenvalues of A within `tolerance` of `truth`, those of Eigen unless given: after
-/// the reduction, which keeps them, and from it, in exact conjugate pairs.
+/// Expects the eigenvalues of A within `tolerance` of `known`, or of Eigen's if empty: after the
+/// reduction, which keeps them, and from it, in exact conjugate pairs.
 void expect_eigenvalues(const MatrixXd& A, double tolerance,
                         const std::vector<Complex>& known = {}) {
   std::vector<LongComplex> truth(known.begin(), known.end());

@@ -1,4 +1,4 @@
-// The search for the largest share of damping that a loop bears, on margins that are functions.
+// The search for the largest share of damping that a loop tolerates, with functions as margins.
 #include <dashpot/analysis/design/level_search.hpp>
 
 #include <gtest/gtest.h>

@@ -111,8 +111,8 @@ TEST(ModeTracker, HasRoomForModesThatDampingMakesOfZeroModes) {
   EXPECT_GT(found, 3);
 }
 
-/// C = d A with a large d: slow eigenvalues are near those of -A^-1 K / d, that is -2 / d and
-/// -10 / (3 d), and fast ones near those of -d A.
+/// C = d A with a large d: slow eigenvalues are near the eigenvalues of -A^-1 K / d, -2 / d and
+/// -10 / (3 d), and fast ones near the eigenvalues of -d A.
 TEST(ModeTracker, KeepsTheSlowEigenvaluesOfHeavilyOverdampedModes) {
   for (const double d : {1e4, 1e5, 1e8}) {
     SCOPED_TRACE(d);

@@ -1,4 +1,4 @@
-// What the tracker says about single systems: shapes, slopes, states, counters, failures.
+// Results of the tracker for single systems: shapes, slopes, states, counters, failures.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -263,7 +263,7 @@ TEST(TrackedEnclosure, OfAPerturbedBasisStillEncloses) {
   EXPECT_GE(tightest, 0.01);
 }
 
-/// Where bounds begin to fail, following fails before the direct solver does, and the other way
+/// At the border of provable bounds, following fails before the direct solver, or the other way
 /// round.
 TEST(ModeTracker, SaysOkOnlyIfAllBoundsAreFinite) {
   constexpr int kModes = 6;

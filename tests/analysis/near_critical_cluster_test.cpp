@@ -60,8 +60,8 @@ TEST(NearCriticalCluster, IsSolvedAndBoundedHoweverWeaklyItsModesAreCoupled) {
   }
 }
 
-/// Where the ratio is 1 to the last bit, frequencies that are equal are known to about a root of
-/// the rounding errors, however ill conditioned the mass matrix is.
+/// If the ratio is 1 to the last bit, equal frequencies are known to about the root of the rounding
+/// errors, however ill conditioned the mass matrix is.
 TEST(NearCriticalCluster, IsBoundedWhereModesCoincide) {
   testing::Random random(7005);
   for (int trial = 0; trial < 60; ++trial) {
@@ -90,7 +90,7 @@ TEST(NearCriticalCluster, IsBoundedWhereModesCoincide) {
   }
 }
 
-/// What changes is far below what Newton's method can tell apart in the basis.
+/// The changes are far below the resolution of Newton's method in the basis.
 TEST(NearCriticalCluster, IsFollowed) {
   testing::Random random(7003);
   for (const double coupling : {1e-9, 1e-8, 1e-7, 1e-6, 1e-4}) {

@@ -107,7 +107,7 @@ TEST(NullSpaceDamping, CountsTheErrorOfTheMass) {
 }
 
 TEST(NullSpaceDamping, TakesRoundedZerosOfTheSpringsForZeros) {
-  // K_C has one direction, whose matrix is rounded: that of the others was held too, by springs of
+  // K_C has one direction, and its matrix is rounded. The other directions once had springs too, of
   // 1e-8 of its stiffness.
   Random random(2107);
   for (int trial = 0; trial < 50; ++trial) {

@@ -78,8 +78,8 @@ Eigen::MatrixXcd reference_phi(int k, const MatrixXd& A, double t, double omega 
   return Z.rounded().topRightCorner(n, n);
 }
 
-/// What a relative change of eps in A t alone does to phi_k: eps for its rational part and
-/// eps |A t| for its exponential part. `margin` roundings are allowed.
+/// A relative change of eps in A t alone changes phi_k by eps in its rational part and eps |A t| in
+/// its exponential part. `margin` roundings are allowed.
 void expect_accurate(const MatrixXd& A, double t, double omega = 0, double margin = 16) {
   const double size = (A - Complex(0, omega) * MatrixXd::Identity(A.rows(), A.cols())).norm() * t;
   const double growth = reference_phi(0, A, t, omega).cwiseAbs().maxCoeff();

@@ -190,8 +190,8 @@ TEST(BasisResidual, OfForcesOfDampersThatCancelIsCounted) {
 }
 
 TEST(BasisResidual, OfSumsThatCancelToTheLastDigitIsCounted) {
-  // One joint with c = -(l1 + l2), k = l1 l2 in two words each: what is left of R, and of the Gram
-  // matrix off its diagonal, are the rounding errors of the double-double arithmetic.
+  // One joint with c = -(l1 + l2), k = l1 l2 in two words each: R and the off-diagonal Gram matrix
+  // contain only the rounding errors of the double-double arithmetic.
   Random random(5202);
   for (int trial = 0; trial < 400; ++trial) {
     const double first = random.uniform(-2, -1), second = random.uniform(-4, -3);
@@ -245,7 +245,7 @@ TEST(BasisResidual, AttainsErrorsOfCoefficients) {
                         : system.stiffness_error) = MatrixXd::Constant(1, 1, error);
     (coefficient == 0 ? off.mass : coefficient == 1 ? off.damping : off.stiffness)(0, 0) = -error;
     BasisResidual<> residual;
-    // That of the damping is attained in R, but not in the Gram matrix as well.
+    // The bound for the damping is attained in R, but not in the Gram matrix as well.
     EXPECT_GT(expect_bounded(system, off, false, true, basis, residual),
               coefficient == 1 ? 0.9 : 1 - 1e-9);
   }

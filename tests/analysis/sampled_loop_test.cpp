@@ -80,7 +80,7 @@ TEST(SampledLoop, SolvesTheCharacteristicEquation) {
 }
 
 /// One joint with friction and gravity: with r1 and r2 the roots of M r^2 + D r + G, the robot's
-/// transfer from held torque to position is that of partial fractions,
+/// transfer from held torque to position is, in partial fractions,
 ///     q / f = sum over i of (e^(r_i T) - 1) / (M r_i (r_i - r_j) (z - e^(r_i T))),
 /// and the velocity has r_i times each term.
 TEST(SampledLoop, KnowsFrictionAndGravity) {
@@ -135,7 +135,7 @@ TEST(SampledLoop, PutsModesInThePlacesOfTheContinuousOnes) {
   EXPECT_GT(compared, 300);
 }
 
-/// More damping than the hold bears: the matrix from tick to tick has two rows, and a negative z.
+/// More damping than the hold allows: the matrix from tick to tick has two rows, and a negative z.
 TEST(SampledLoop, SaysWhatAlternates) {
   SampledLoop loop;
   const double T = loop.period, K = 100;
@@ -289,7 +289,7 @@ TEST(SampledLoop, DelaysOnlyTheCommandsThatThereAre) {
   EXPECT_GT(largest, 300);
 }
 
-/// A command that is small beside the others is none the less one.
+/// A command that is small beside the others counts too.
 TEST(SampledLoop, DelaysACommandThatIsSmall) {
   System<> system(2);
   system.mass.setIdentity();

@@ -38,7 +38,7 @@ struct Pair {
   Extended ratio() const { return -(first + second).real() / (2 * frequency()); }
 };
 
-/// The two eigenvalues nearest those of `mode`.
+/// The two eigenvalues nearest to the eigenvalues of `mode`.
 Pair pair_of(const Coefficients& system, const Mode<>& mode) {
   const Index n = system.mass.rows();
   ExtendedMatrix A = ExtendedMatrix::Zero(2 * n, 2 * n);

@@ -89,8 +89,8 @@ TEST(SpectrumOfOneCoordinate, IsTheTextbookOscillator) {
   EXPECT_TRUE(spectrum.proportional);
 }
 
-/// Without damping there is no doubt that a mode is undamped, and no need for more digits; the
-/// solver asks this of each system anew.
+/// Without damping a mode is certainly undamped and needs no more digits; the solver decides this
+/// for each system again.
 TEST(SpectrumOfOneCoordinate, NeedsNoMoreDigitsWithoutDamping) {
   SpectrumSolver<> solver;
   Spectrum<> spectrum;

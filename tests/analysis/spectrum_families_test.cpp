@@ -90,8 +90,8 @@ TEST_P(ClassicalDamping, IsFoundInEveryMode) {
   }
 }
 
-/// NLEVP "sleeper": A is circulant [1 -2 1], C = I + A^2, K = I + A + A^2, all of them integers.
-/// Where n is a multiple of six, -1 has two Jordan blocks, which rounding errors split.
+/// NLEVP "sleeper": A is circulant [1 -2 1], C = I + A^2, K = I + A + A^2, all of them integers. If
+/// n is a multiple of six, -1 has two Jordan blocks, which rounding errors split.
 TEST(SleeperFamily, HasTwoCriticalModes) {
   for (const int n : {6, 12, 24}) {
     const MatrixXd I = MatrixXd::Identity(n, n);

@@ -1,4 +1,4 @@
-// What validate() accepts, and the words in which it refuses the rest.
+// Systems that validate() accepts, and its words for the others.
 #include <dashpot/analysis/elastic_form.hpp>
 #include <dashpot/analysis/mode.hpp>
 #include <dashpot/analysis/system.hpp>

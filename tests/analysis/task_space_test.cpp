@@ -211,7 +211,7 @@ TEST(ToJointSpace, SaysWhatIsWrongWithAnImpedance) {
   // With a wrench and its derivatives, unless these are taken away.
   for (const Case& c : {
            Case{[](TaskImpedance&) {}, ""},
-           // What is missing
+           // Missing members
            Case{[](TaskImpedance& i) { i.jacobian.reset(); }, "task_damping: needs a jacobian"},
            Case{[](TaskImpedance& i) { i.jacobian.reset(), i.task_damping.reset(); },
                 "task_stiffness: needs a jacobian"},
@@ -226,7 +226,7 @@ TEST(ToJointSpace, SaysWhatIsWrongWithAnImpedance) {
            Case{[](TaskImpedance& i) { i.jacobian_derivatives.clear(); },
                 "wrench: needs jacobian_derivatives"},
            Case{[](TaskImpedance& i) { i.wrench.reset(); }, "jacobian_derivatives: needs a wrench"},
-           // What is of the wrong size
+           // Wrong sizes
            Case{[](TaskImpedance& i) { i.mass = zero(3, 2); }, "mass: is 3 x 2, expected 3 x 3"},
            Case{[](TaskImpedance& i) { i.jacobian = zero(2, 4); },
                 "jacobian: is 2 x 4, expected 2 x 3"},
@@ -244,7 +244,7 @@ TEST(ToJointSpace, SaysWhatIsWrongWithAnImpedance) {
                 "jacobian_derivatives[2]: is 1 x 3, expected 2 x 3"},
            Case{[](TaskImpedance& i) { i.wrench = VectorXd::Zero(3); },
                 "wrench: is 3 x 1, expected 2 x 1"},
-           // What is not finite, or not symmetric
+           // Not finite, or not symmetric
            Case{[](TaskImpedance& i) { (*i.jacobian)(1, 2) = kNan; },
                 "jacobian: entry (2,3) is not a finite number"},
            Case{[](TaskImpedance& i) { (*i.task_damping)(0, 0) = kNan; },

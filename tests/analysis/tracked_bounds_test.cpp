@@ -224,8 +224,8 @@ TEST(TrackedEnclosure, HoldsForEveryGramMatrix) {
   }
 }
 
-/// Errors of N are gamma (a a' + m m'), those of G gamma (a b' + b a' + c m m') and those of
-/// N Lambda (residual_errors.hpp). A single block has a radius of G / (1 - N).
+/// Errors of N are gamma (a a' + m m'). Errors of G are gamma (a b' + b a' + c m m') and the errors
+/// of N Lambda (tracked_enclosure.hpp). A single block has a radius of G / (1 - N).
 TEST(TrackedEnclosure, CountsRoundingErrorsOfTheResidual) {
   Random random(2501);
   int single = 0;
@@ -393,7 +393,7 @@ TEST(BalancedBasis, IsOrthonormalInTheEnergyOfEachBlockAndKeepsItsMetric) {
       EXPECT_NEAR(after.determinant(), before[at(i)].determinant(),
                   1e-9 * std::max(1.0, std::abs(after.determinant())));
     }
-    // What is even already stays.
+    // Even blocks stay.
     const BlockEigenbasis balanced = any.basis;
     EXPECT_FALSE(balance(any.pencil(), false, any.basis));
     EXPECT_EQ(any.basis.Z.items, balanced.Z.items);
@@ -442,7 +442,7 @@ TEST(RotatedBasis, IsOrthogonalInTheEnergyMetricToo) {
       EXPECT_NEAR(elastic - kinetic, 0, 1e-12);  // still orthogonal in S
       EXPECT_NEAR(x.head(p).squaredNorm() - x.tail(n).dot(any.system.mass * x.tail(n)), 1, 1e-12);
     }
-    // What is orthogonal to the tolerance is left alone.
+    // Blocks that are orthogonal to the tolerance are left alone.
     EXPECT_FALSE(rotate_hyperbolically(residual, 2, any.basis));
   }
 }

@@ -80,7 +80,7 @@ TEST(Work, OfTheSolverIsAllOrNothing) {
   }
 }
 
-/// In the solver's first blocks the work of a step is that of each pair of blocks, once.
+/// In the solver's first blocks the work of a step is the sum over pairs of blocks, each once.
 TEST(Work, OfASylvesterEquationIsCountedOnceForEachPair) {
   BlockList<kMaxDof> blocks;
   int first = 0;
@@ -95,7 +95,7 @@ TEST(Work, OfASylvesterEquationIsCountedOnceForEachPair) {
             3 * 250 + equation(3, 40, 500) + 2 * equation(6, 60, 0));
 }
 
-/// What one update left undone the next one finds, in its place.
+/// The next update finds the modes that one update left undone, at their indices.
 TEST(Work, OfTheTrackerIsAllOrNothing) {
   Random random(812);
   auto tracker = std::make_unique<ModeTracker>();

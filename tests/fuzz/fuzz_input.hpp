@@ -1,7 +1,7 @@
 #pragma once
-// What the fuzzers share: bytes read as values, and a place for files.
+// Shared by the fuzzers: bytes read as values, and a place for files.
 
-#include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp is no standard C++
+#include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp is not standard C++
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,7 +14,7 @@
 #include <limits>
 #include <string>
 
-/// What libFuzzer calls with each input.
+/// Called by libFuzzer with each input.
 // NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 

@@ -14,7 +14,7 @@ using dashpot::modes_t;
 using dashpot::state_t;
 using dashpot::fuzz::require;
 
-/// What can be decoded is encoded to the same bytes, but for booleans other than 0 and 1.
+/// A decoded message is encoded to the same bytes, but for booleans other than 0 and 1.
 template <class Message>
 void decode_as(const std::uint8_t* data, std::size_t size) {
   Message message;

@@ -1,4 +1,4 @@
-// Modes from motion under forces that nobody measured.
+// Modes from motion under unmeasured forces.
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/tests/support/refusal.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
@@ -35,7 +35,7 @@ Sensors noise_of(double noise, double missing = 0) {
   return sensors;
 }
 
-/// How the modes found compare with the true ones.
+/// The modes found beside the true ones.
 struct Comparison {
   int modes = 0, found = 0, frequencies_inside = 0, ratios_inside = 0, false_ones = 0;
 
@@ -83,7 +83,7 @@ struct ShakenArm {
   MatrixXd motion;
 };
 
-/// How often intervals hold the truth is counted by `./run stress identify`.
+/// `./run stress identify` counts how often intervals contain the truth.
 TEST(IdentifyAmbient, FindsTheModesOfShakenArmsWithinTheirDeviations) {
   DASHPOT_SKIP_IF_QUICK();
   Comparison all;
@@ -161,7 +161,7 @@ TEST(IdentifyAmbient, FindsTheSameInTheSameMotionHoweverItIsRecorded) {
   for (const MeasuredMode& mode : found.rejected) EXPECT_GT(mode.natural_frequency, 0.01);
 }
 
-/// It hides no modes, and is none itself.
+/// It hides no modes, and does not count as one.
 TEST(IdentifyAmbient, AHumIsTakenAway) {
   ShakenArm shaken(3);
   constexpr double kHum = 31;  // rad/s, where the arm moves

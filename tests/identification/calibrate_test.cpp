@@ -1,4 +1,4 @@
-// What records of arms in MuJoCo say of rotors, delay, gravity and links, where the truth is known.
+// Rotors, delay, gravity and links from records of arms in MuJoCo, whose truth is known.
 #include <dashpot/identification/check_model.hpp>
 #include <dashpot/tests/support/moved_arm.hpp>
 #include <dashpot/tests/support/sanitized.hpp>

@@ -1,4 +1,4 @@
-// What records of torques say of a model, where the truth is known.
+// Records of torques beside a model, with known truth.
 #include <dashpot/identification/check_model.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -41,7 +41,7 @@ controller::RobotDescription panda() {
   return description_of(testing::arms()[0]);
 }
 
-/// How many of the numbers that were fitted lie within `deviations` of the truth, and all.
+/// Number of fitted parameters within `deviations` of the truth, and of all.
 std::pair<int, int> inside(const ModelCheck& check, const RecordedArm& arm, double deviations) {
   int within = 0, all = 0;
   const auto count = [&](const Estimate& one, double truth) {

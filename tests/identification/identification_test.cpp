@@ -356,7 +356,7 @@ TEST(FindDecays, BeginsAfterThePushAndAtTheStep) {
   ASSERT_EQ(modes.modes.size(), 2U);
   EXPECT_NEAR(modes.modes[0].natural_frequency, decay.w1, 0.005 * decay.w1);
   EXPECT_NEAR(modes.modes[1].damping_ratio, decay.z2, 0.01);
-  // And keeps to what it is told is free.
+  // And keeps to the samples that are given as free.
   std::vector<bool> free(static_cast<std::size_t>(record.time.size()), true);
   for (Index i = 0; i < record.time.size(); ++i) {
     free[static_cast<std::size_t>(i)] = record.time[i] < 4.9 || record.time[i] > 5.4;
@@ -376,7 +376,7 @@ TEST(DecayFit, DoesNotDetermineWhatMovesNothing) {
   }
   const VectorXd noise = VectorXd::Constant(2, 1e-5);
   const DecayFit fit = fit_decays(data, factors, noise, 20);
-  // Lost before the second sample, but for a derivative whose square is no number above zero.
+  // Lost before the second sample, but for a derivative whose square underflows.
   factors.push_back(DecayFactor::of_single(-2e5));
   const DecayFit more = fit_decays(data, factors, noise, 20);
   for (int i = 0; i < 4; ++i) {
@@ -385,8 +385,8 @@ TEST(DecayFit, DoesNotDetermineWhatMovesNothing) {
   EXPECT_FALSE(more.covariance(4, 4) < 1e10);
 }
 
-/// Deviations are those of the fit and, squared and added, how far away the same mode of the next
-/// larger model is.
+/// Deviations are the fit's plus, in squares, the distance to the same mode of the next larger
+/// model.
 TEST(IdentifyDecays, DeviationsHoldWhatALargerModelThinks) {
   int compared = 0;
   for (const std::uint64_t seed : {41u, 42u, 43u}) {
@@ -442,7 +442,7 @@ TEST(IdentifyDecays, FindsMostModesWhereASearchGotLost) {
 }
 
 /// After fast motion there is slow motion whose speed, but not whose size, is lost in noise; digits
-/// that rest are no noise less.
+/// that rest do not mean less noise.
 TEST(FindDecays, GoesOnWhereSlowMotionOutlastsFastMotion) {
   for (const double digit : {0.0, 1e-4}) {
     Dice draw(34);

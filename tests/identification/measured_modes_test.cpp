@@ -1,4 +1,4 @@
-// What measured modes are believed, and what stability diagrams say of them.
+// Which measured modes are believed, and their stability diagrams.
 #include <dashpot/identification/search/measured_modes.hpp>
 #include <dashpot/tests/identification/good_mode.hpp>
 
@@ -135,7 +135,7 @@ TEST(MeasuredModes, AtTheSumOfTwoMuchLargerOnesAreNone) {
   EXPECT_EQ(at(a + b, 101), "");  // which cancels, and is not known itself
 }
 
-/// What a model needs beside its modes says that the record is not a sum of decays.
+/// A model with many doubtful modes shows that the record is not a sum of decays.
 TEST(MeasuredModes, OfOneOrderAloneAreBelievedAmongFewThatAreNot) {
   MeasuredMode alone = good_mode(10), first = good_mode(23), second = good_mode(40);
   alone.stability = 0;

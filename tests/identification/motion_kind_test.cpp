@@ -1,4 +1,4 @@
-// What kind of motion a record shows, and that neither scales, offsets, drift nor digits matter.
+// The kind of motion in a record, whatever its scales, offsets, drift and digits.
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/motion_verdict.hpp>
 #include <dashpot/tests/support/dice.hpp>
@@ -108,7 +108,7 @@ std::vector<Kind> kinds() {
           {"noise", MotionKind::kNothing, noise_alone}};
 }
 
-/// What people's sensors and units do to a record.
+/// A change of a record by sensors and units.
 struct Change {
   std::string name;
   double time = 1, size = 1, offset = 0, drift = 0, digit = 0;

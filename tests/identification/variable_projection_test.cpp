@@ -45,7 +45,7 @@ class Decays : public ::testing::TestWithParam<bool> {
     return DecayData(records);
   }
 
-  /// `x` are what the parameters are more than those of three factors.
+  /// `x`: the parameters less the values of three factors.
   VariableProjection at(const VectorXd& x) const {
     std::vector<DecayFactor> factors(3);
     factors[0] = {.first = std::log(9.0), .second = 0.12, .reference = 1};
@@ -84,7 +84,7 @@ TEST_P(Decays, HaveTheGradientOfTheirCost) {
   }
 }
 
-/// Where nothing is left over, J'J is half of the second derivative.
+/// Without a residual, J'J is half of the second derivative.
 TEST_P(Decays, HaveTheCurvatureOfTheirCost) {
   const VariableProjection any = at(zero());
   for (DecayPart& part : data_.parts) {

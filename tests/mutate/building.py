@@ -137,7 +137,7 @@ def build(targets):
 
 
 def build_changed(drawn, folders, commands):
-    """Builds the tests with those of the changes that compile, and returns these."""
+    """Builds the tests with the changes that compile, and returns these changes."""
     while True:
         changes = without_misfits(drawn, folders, commands)
         print(f"{len(changes)} changes ({len(drawn) - len(changes)} more do not compile)",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from clang.cindex import CursorKind as Kind
 from clang.cindex import Index
 
-# What an operator becomes, and what that change is called.
+# Replacements of an operator, with the name of each change.
 SWAPS = {
     "<": [("<=", "boundary"), (">=", "negated")],
     "<=": [("<", "boundary"), (">", "negated")],

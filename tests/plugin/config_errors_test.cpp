@@ -1,4 +1,4 @@
-// What load_config says to a bad file: one line that names the key, the reason and the line.
+// Errors of load_config for a bad file: one line that names the key, the reason and the line.
 #include <dashpot/tests/plugin/config_file.hpp>
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// What a configuration file says is what the controller gets.
+// The controller gets the values of the configuration file.
 #include <dashpot/controller/base/settings_table.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -203,7 +203,7 @@ TEST(Config, TakesADampingRatioInPlaceOfADamping) {
   EXPECT_EQ(gains("null_space", "stiffness: 3, damping_ratio: 0.8").null_stiffness,
             VectorXd::Constant(7, 3));
   EXPECT_EQ(gains("task", task_springs + "damping_ratio: 2").task_stiffness(0, 0), 9);
-  // Where no spring is left, nothing can be designed.
+  // Without springs nothing can be designed.
   EXPECT_GT(gains("joint", "stiffness: 0, damping_ratio: 0.8").joint_damping.diagonal().minCoeff(),
             0);
 }
@@ -453,7 +453,7 @@ TEST(ConfigExample, Loads) {
   EXPECT_EQ(settings.limits.velocity, config.model.joint_values(&controller::Joint::velocity));
 }
 
-/// Where the example's comment says no other default, its value is the default.
+/// Unless the example's comment gives another default, its value is the default.
 TEST(ConfigExample, ShowsDefaults) {
   const Config config = controller::load_config(kExample);
   const Settings none = controller::default_settings(config.model);

@@ -13,8 +13,8 @@
 namespace dashpot::controller {
 namespace {
 
-/// Two links, with a damper in the shoulder that the loop bears the better the more the elbow is
-/// bent, up to a right angle.
+/// Two links with a damper in the shoulder. The loop tolerates the damper better the more the elbow
+/// is bent, up to a right angle.
 class Judging : public ::testing::Test {
  protected:
   Judging()
@@ -65,7 +65,7 @@ TEST_F(Judging, KnowsGainsNextToWhereItAcceptedThemLast) {
   EXPECT_FALSE(accepts(damper, 0.705));     // so that this is far
 }
 
-/// Where the arm has gone to a place that bears less than limits.gain_margin.
+/// After the arm has moved to a posture with less margin than limits.gain_margin.
 TEST_F(Judging, TakesWhatIsBetterThanWhatIs) {
   make();
   const double damper = 1.2 * most(0.8);

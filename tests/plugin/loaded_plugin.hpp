@@ -60,7 +60,7 @@ inline Handle create(const std::string& text) {
   return Handle(plugin().create(scratch.write("arm.yaml", text).c_str()));
 }
 
-/// What a host keeps for one arm: its state, and what the C structs point to.
+/// A host's data of one arm: its state, and the targets of the C structs' pointers.
 struct Host {
   explicit Host(Handle handle, const std::vector<double>& start)
       : controller(std::move(handle)),

@@ -37,7 +37,7 @@ inline void run_simulated(const controller::RobotModel& model, Host& host, int t
   }
 }
 
-/// A Panda whose joints bear their gravity already.
+/// A Panda whose joints start with their gravity torque.
 inline Host panda_host(const std::string& settings = "") {
   Host host(create(panda() + settings), panda_posture());
   const auto model = load(panda() + settings).model;

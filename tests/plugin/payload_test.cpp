@@ -1,4 +1,4 @@
-// What the plugin is told of the tip: what it carries, and how fast it may be.
+// Settings of the tip: its payload, and its speed limit.
 #include <dashpot/tests/plugin/panda_host.hpp>
 
 #include <gmock/gmock.h>
@@ -67,7 +67,7 @@ TEST(PluginPayload, IsRefusedWithAReason) {
 }
 
 TEST(PluginPayload, IsJudgedWithTheGainsInForce) {
-  // Damping that a heavy wrist bears and a light one does not.
+  // Damping that a heavy wrist tolerates and a light one does not.
   Host host = carrying_host("mass: 3, center: [0, 0, 0.1], inertia: [0.3, 0.3, 0.3]",
                             "gains: {joint: {stiffness: [500, 500, 500, 500, 300, 300, 300], "
                             "damping: [50, 50, 50, 50, 30, 30, 45]}}\n");
@@ -78,7 +78,7 @@ TEST(PluginPayload, IsJudgedWithTheGainsInForce) {
   EXPECT_THAT(plugin().last_error(), HasSubstr("gain margin"));
   for (int i = 0; i < 600; ++i) host.tick();
   EXPECT_NEAR(host.snapshot().payload_mass, 3, 1e-12);
-  // What was refused is forgotten: gains are judged with what the arm carries.
+  // The refused payload is forgotten: gains are judged with the present one.
   double margin = 0;
   EXPECT_EQ(plugin().judge_gains(host.controller.get(), nullptr, nullptr, &margin),
             DASHPOT_NULL_ARGUMENT);
@@ -172,13 +172,13 @@ TEST(PluginPayload, HasToLeaveRatioDampingItsMarginOnceItIsDropped) {
   EXPECT_NE(create(text + "analysis: {sampled: {delay: 2}}\n"), nullptr) << plugin().last_error();
 }
 
-/// Where the arm has gone to a place at which less is borne.
+/// After the arm has moved to a posture that tolerates less damping.
 TEST(PluginPayload, IsTakenWithAWarningIfItIsBetterThanWhatIs) {
   Host host = panda_host("gains: {joint: {stiffness: 300, damping: 5}}\n");
   dashpot_controller* const arm = host.controller.get();
   ASSERT_NE(arm, nullptr) << plugin().last_error();
   const std::vector<double> folded{0, -0.2, 0, -2.9, 0, 2.9, 0.785};
-  // The most damping that is borne at the start, a little of it less.
+  // A little less than the most damping that the start tolerates.
   std::array<double, 49> D{};
   dashpot_gains gains = panda_gains();
   gains.joint_damping = D.data();

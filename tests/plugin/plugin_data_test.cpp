@@ -1,5 +1,5 @@
-// From the C structs to the controller's types, to them, and from there to those of messages: every
-// field arrives, and in its own place.
+// From the C structs to the controller's types and back, and on to the messages' types: every field
+// arrives in its own place.
 #include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/lcmtypes/plugin_samples.hpp>
 
@@ -17,7 +17,7 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// `size` numbers of which no two are alike, nor like those of another call.
+/// `size` numbers, all different, also from the numbers of other calls.
 class Numbers {
  public:
   std::vector<double> operator()(int size) {

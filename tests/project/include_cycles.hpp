@@ -8,7 +8,7 @@
 
 namespace dashpot::tests {
 
-/// What each name points to.
+/// The targets of each name.
 using Arrows = std::map<std::string, std::set<std::string>>;
 
 /// Looks for cycles from one name after the other.

@@ -254,7 +254,7 @@ def main():
     if difference:
         print("\n".join(difference))
         sys.exit("What others rely on has changed. If docs/stability.md allows it: ./run interface "
-                 "writes the list anew")
+                 "writes the list again")
 
 
 main()

@@ -19,13 +19,13 @@ struct Room {
   int step = 0;
   /// Its public headers, without their ends: they stand in the library's own folder.
   std::vector<std::string_view> doors;
-  /// How the names of other headers that it may include begin; "" is any. Of another library only
-  /// the public headers may be included, those that stand here in full, and, with kPrivate, all.
+  /// Beginnings of the names of other headers that it may include; "" is any. Of another library it
+  /// may include the public headers, the headers named here in full, and, with kPrivate, all.
   std::vector<std::string_view> others;
 
   /// "analysis"
   std::string_view library() const { return folder.substr(0, folder.find('/')); }
-  /// Programs, tests and benchmarks are no libraries: they may include anything.
+  /// Only libraries are restricted: programs, tests and benchmarks may include anything.
   bool is_of_library() const { return !others.front().empty(); }
 };
 

@@ -23,7 +23,7 @@ inline bool is_hidden_or_built(const std::string& name) {
   return (name.starts_with(".") && name != ".ci") || name.starts_with("build");
 }
 
-/// All text files but those of hidden directories and of the build.
+/// All text files outside hidden directories and the build.
 inline const std::vector<File>& files() {
   static const std::vector<File> all = [] {
     std::vector<File> found;

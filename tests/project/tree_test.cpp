@@ -65,7 +65,7 @@ TEST(Tree, GivesEveryHeaderOfALibraryANameOfItsOwn) {
   EXPECT_GT(known.size(), 100U);
 }
 
-/// The file of this path; null if there is none, or it is no text.
+/// The text file of this path; null if there is none.
 const File* find_file(const std::string& path) {
   const auto found = std::find_if(files().begin(), files().end(),
                                   [&](const File& file) { return file.path == path; });

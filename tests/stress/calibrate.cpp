@@ -21,7 +21,7 @@ using dashpot::stress::Request;
 using Eigen::Index;
 
 constexpr double kKnownWithin = 0.1;  // of a rotor that is called determined
-constexpr double kNominal = 0.95;  // share of truths within 95 % intervals
+constexpr double kNominal = 0.95;     // share of truths within 95 % intervals
 constexpr double kLeastHeld = 0.9, kMostHeld = 0.98;
 constexpr double kAllRecords = 60;
 
@@ -50,7 +50,7 @@ constexpr std::array kRows = {
     Row{.what = "a link a quarter heavier", .records = 24, .heavier = 0.25},
 };
 
-/// How many estimates lie within their 95 % intervals.
+/// Counts estimates within their 95 % intervals.
 struct Held {
   int inside = 0, all = 0;
 

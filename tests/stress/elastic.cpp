@@ -144,7 +144,7 @@ Calm calm_of(const ElasticArm& arm, controller::PositionSensor sensor, long post
   calm.refused_all = judge.judge_anywhere(gains).margin < settings.limits.gain_margin;
   try {
     (void)controller::Controller(gears.model, settings);
-  } catch (const controller::InvalidSettings&) {  // of a brake that the gears do not bear
+  } catch (const controller::InvalidSettings&) {  // the brake is too stiff for the gears
     calm.refused_all = true;
   }
   while (calm.postures < postures && !calm.refused_all) {
@@ -217,11 +217,11 @@ bool stay_calm(const Request& request) {
     }
     if (request.brief) break;
   }
-  std::printf("\n%d loops that nobody refuses are unstable\n", unstable);
+  std::printf("\n%d loops that are not refused are unstable\n", unstable);
   return unstable == 0;
 }
 
-/// What a stop was like, of the links.
+/// Measures of a stop, of the links.
 struct Stop {
   double tenth = -1;   ///< s, until a tenth of the speed is left for good; -1: never
   double way = 0;      ///< of joint 1, degrees

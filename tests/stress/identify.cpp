@@ -74,7 +74,7 @@ Motions chirps(const SprungArm& arm, int inputs, Dice& draw) {
   return result;
 }
 
-/// The energy of a release is in the springs; the shares are those of the last one.
+/// The energy of a release is in the springs; the shares belong to the last one.
 Motions releases(const SprungArm& arm, int count, const std::optional<Flaw>& flaw,
                  Eigen::VectorXd start, Dice& draw) {
   constexpr int kSamples = 1500;
@@ -119,7 +119,7 @@ struct Tallies {
   Tally ordinary, heavy;
   int false_modes = 0;
 
-  /// Takes for a true mode the nearest one found, if it is not farther than this, relative.
+  /// Matches a true mode with the nearest one found within the relative distance `farthest`.
   void compare(const SprungArm& arm, const std::vector<double>& shares,
                const Identification& result, double farthest) {
     std::vector<bool> used(result.modes.size());
@@ -196,8 +196,7 @@ bool identify(const Request& request) {
   const Tally& ordinary = tallies.ordinary;
   print(ordinary, "ratio below 0.7");
   print(tallies.heavy, "above");
-  std::printf("%d modes that are none; %.2f s a case\n", tallies.false_modes,
-              seconds / request.count);
+  std::printf("%d spurious modes; %.2f s a case\n", tallies.false_modes, seconds / request.count);
   // In few cases, fewer may be inside by chance.
   const double least = request.count >= 20 ? 0.88 : 0.75;
   return ordinary.found > 0 && ordinary.frequency_inside >= least * ordinary.found &&

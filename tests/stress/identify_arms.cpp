@@ -25,7 +25,7 @@ using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 using Json = nlohmann::json;
 
-/// A mode is right if it is no farther than this from one of the arm's, of that one's frequency.
+/// A mode is right within this distance of one of the arm's, relative to its frequency.
 constexpr double kNear = 0.1;
 constexpr double kMostFalse = 0.05, kLeastFound = 0.7, kLeastInside = 0.88;
 /// Recordings of kinds that do not say how many, as of a clean release.
@@ -112,7 +112,7 @@ std::string written(const Recording& recording) {
   return text;
 }
 
-/// What the program prints as JSON.
+/// The program's JSON output.
 Json report_on(const Recording& recording, const std::string& file) {
   std::FILE* out = std::fopen(file.c_str(), "w");
   if (out == nullptr) throw std::runtime_error("cannot write " + file);
@@ -283,7 +283,7 @@ Tally tally_of(const Row& row, std::size_t number, const Request& request,
   return tally;
 }
 
-/// What a row lacks of what it should have; empty if nothing.
+/// The requirements that a row misses; empty if none.
 std::string missed(const Row& row, const Tally& tally) {
   std::string text;
   const int right = tally.believed - tally.wrong;

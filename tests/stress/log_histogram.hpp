@@ -1,5 +1,5 @@
 #pragma once
-// How often each duration was seen, in memory of a fixed size.
+// A histogram of durations, in memory of a fixed size.
 
 #include <algorithm>
 #include <array>
@@ -40,7 +40,7 @@ class LogHistogram {
 
  private:
   static constexpr unsigned kBinsOfOctave = 32;
-  static constexpr unsigned kBits = 40;  // of the longest duration that is told from longer ones
+  static constexpr unsigned kBits = 40;  // of the longest duration with a bin of its own
 
   /// Bits that a bin of this value leaves out: all but six from the first.
   static unsigned shift_of(std::uint64_t value) noexcept {

@@ -86,12 +86,13 @@ CLI::Validator above_zero() {
   return {[](const std::string& text) {
             char* end = nullptr;
             const double value = std::strtod(text.c_str(), &end);
-            return *end == '\0' && value > 0 && value < 1e18 ? "" : text + " is no number above 0";
+            return *end == '\0' && value > 0 && value < 1e18 ? ""
+                                                             : text + " is not a number above 0";
           },
           ""};
 }
 
-/// What each part and `all` can be told.
+/// Adds the options of each part and of `all`.
 void add_options(CLI::App& command, const std::vector<std::string>& more, Request& request) {
   command.add_flag("--short", request.brief, "do little, to see that it works");
   for (const std::string& option : more) {

@@ -1,5 +1,5 @@
 #pragma once
-// The parts of the program: what each does, and what it can be told.
+// The parts of the program: what each does, and its options.
 
 #include <cstdint>
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace dashpot::stress {
 
-/// What a part is told on the command line.
+/// A part's options on the command line.
 struct Request {
   std::string kind;  ///< one of the part's
   double count = 0;  ///< of ticks, steps, cases, seconds, ...
@@ -20,7 +20,7 @@ struct Request {
   long whole() const { return static_cast<long>(count); }
 };
 
-/// How much a part does, of one kind if it has several.
+/// The amount of a part, of one kind if it has several.
 struct Amount {
   double count, brief;  ///< by default, and with --short
   const char* kind = "";

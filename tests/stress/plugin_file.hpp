@@ -17,7 +17,7 @@ namespace dashpot::stress {
 class PluginFile {
  public:
   PluginFile(std::string label_text, const std::string& path) : label(std::move(label_text)) {
-    // Its functions call each other, and not those of the plugin that the program links with.
+    // Its functions call each other, and not the plugin that the program links with.
     void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
     if (library == nullptr) throw std::runtime_error(dlerror());
     find(library, "dashpot_create", create);

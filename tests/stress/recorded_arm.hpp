@@ -14,7 +14,7 @@
 
 namespace dashpot::stress {
 
-/// What moves an arm: it is let go; three pushes of 0.1 s; random torques for 60 s; a chirp of
+/// Excitation of an arm: it is let go; three pushes of 0.1 s; random torques for 60 s; a chirp of
 /// torques, 0.3 to 12 Hz in 10 s.
 enum class Motion { kRelease, kPushes, kAmbient, kChirp };
 

@@ -32,7 +32,7 @@ inline Act table(double depth, bool smooth = false) {
     rig.goal = Goal::at(rig.tip_at(rig.position()));
     rig.goal->tip.position.z() -= 0.03 + depth;
     rig.run(8);
-    // What a springy plane gives back where the springs end throws a light wrist.
+    // A springy plane throws a light wrist when the springs end.
     row.finish(rig, {smooth ? 4 : 1.1, true, true});
     row.note = std::to_string(row.seen.changes) + " changes of status";
   };

@@ -1,6 +1,6 @@
 #pragma once
-// What makes a brake feed the arm: states that are late, torques of the wrong sign, rotors that are
-// told and are not there.
+// Causes by which a brake feeds the arm: states that are late, torques of the wrong sign, rotors
+// that are configured but missing.
 
 #include <dashpot/tests/stress/safety_scenarios.hpp>
 
@@ -31,7 +31,7 @@ inline Act late_states(int periods, double share, bool rest) {
   };
 }
 
-/// What exceeds the weight acts the other way.
+/// Torque beyond the weight acts the other way.
 inline void wrong_torque(const PluginFile& plugin, const TestArm& arm, Row& row) {
   stop_all(
       plugin, arm, {}, [](Rig& rig) { rig.excess_factor = -1; }, {100, false, false}, row);

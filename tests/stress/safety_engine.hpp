@@ -1,7 +1,7 @@
 #pragma once
-// What follows a stop, and what stops without need, on robots that another engine moves, MuJoCo:
-// with rotors that the controller knows or does not, dry friction or none, links and bodies that
-// weigh more or less than it knows.
+// The motion after a stop, and needless stops, on robots that another engine moves, MuJoCo: with
+// rotors that the controller knows or does not, dry friction or none, links and bodies that weigh
+// more or less than it knows.
 
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/tests/stress/safety_scenarios.hpp>
@@ -10,12 +10,12 @@
 
 namespace dashpot::stress {
 
-/// How a robot is not what its controller takes it for.
+/// Differences of a robot from its controller's model.
 struct Variant {
   bool rotors_known;
   bool friction;       ///< kFriction of the torque limits each: dry, and viscous at full speed
   double link_factor;  ///< of masses
-  double payload;      ///< kg that nobody knows of
+  double payload;      ///< kg, not known to the controller
 };
 
 constexpr double kFriction = 0.01;
@@ -60,8 +60,8 @@ inline RigOptions options_of(const TestArm& arm, const Variant& variant) {
   return options;
 }
 
-/// What a scenario does with one variant; returns how bad it was, in a number that goes into the
-/// row's note.
+/// Runs a scenario with one variant; returns how bad it was, in a number that goes into the row's
+/// note.
 using Trial = std::function<double(const PluginFile&, const TestArm&, RigOptions, Row&)>;
 
 /// The worst of some rows, with the promises that any of them broke.
@@ -104,7 +104,7 @@ inline Act on_variants(const Trial& trial) {
   };
 }
 
-/// How far the tip is from where it was, in cm, 1, 4 and 9 s later.
+/// Notes how far the tip has moved, in cm, 1, 4 and 9 s later.
 inline double watch_it_sink(Rig& rig, Row& row) {
   const Eigen::Vector3d from = rig.tip_at(rig.position()).position;
   std::string ways;

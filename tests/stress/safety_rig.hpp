@@ -23,7 +23,7 @@
 
 namespace dashpot::stress {
 
-/// What a rig is made of; what is left out is the arm's own.
+/// The options of a rig; the defaults are the arm's own.
 struct RigOptions {
   std::string robot;           ///< YAML lines under `robot`
   std::string config;          ///< YAML lines beside `robot`, `limits` and `analysis`
@@ -59,7 +59,7 @@ struct Goal {
   }
 };
 
-/// What was seen, of the robot itself and not of its sensors, while the robot moved freely.
+/// Measured on the robot itself, not by its sensors, while the robot moved freely.
 struct Measures {
   double speed_share = 0;     ///< greatest joint speed over its limit
   double tip_speed = 0;       ///< greatest, m/s

@@ -9,7 +9,7 @@
 
 namespace dashpot::stress {
 
-/// What a scenario holds the robot to, beside not being driven on when it is too fast.
+/// A scenario's bounds, in addition to no drive beyond the speed limits.
 struct Bounds {
   double speed = 1.5;  ///< greatest joint speed over its limit
   bool rest = true;    ///< still at the end: no motion, no changes of status, no torque that turns

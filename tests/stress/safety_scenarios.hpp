@@ -166,9 +166,9 @@ inline void moved_in_a_pause(const PluginFile& plugin, const TestArm& arm, Row& 
   row.require(back < 0.02, "drives back unasked");
 }
 
-/// Feedback fails in the middle of a motion of the tip, or of the joints.
-/// Where nobody knows how the robot moves, no torque is right: it is to be noticed, and the springs
-/// are to end; then the robot needs brakes.
+/// Feedback fails in the middle of a motion of the tip, or of the joints. If the motion is unknown,
+/// no torque is safe: the controller has to notice it and to end the springs; then the robot needs
+/// brakes.
 inline Act bad_feedback(const std::function<void(sim::SensorFault&, Eigen::Index)>& spoil,
                         bool blind = false) {
   return [spoil, blind](const PluginFile& plugin, const TestArm& arm, Row& row) {

@@ -4,7 +4,7 @@
 // it; states and modes go over LCM and are read again. A line each 10 minutes, or each quarter of a
 // shorter run. The first of these is for warming up; what the last one needs more than the second
 // is a failure, as is a status other than ok, a bound that is lost, a goal that is not reached.
-// Durations are told and not judged. SIGINT or SIGTERM ends it with the cycle of 4 s.
+// Durations are printed and not judged. SIGINT or SIGTERM ends it with the cycle of 4 s.
 #include <dashpot/lcmtypes/plugin_publisher.h>
 #include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
@@ -35,7 +35,7 @@ using dashpot::modes_t;
 using dashpot::state_t;
 using std::chrono::milliseconds;
 
-// What an interval may need more than the second one, and how far from its goal the arm may end.
+// Limits of the growth of an interval over the second one, and of the arm's distance from its goal.
 constexpr std::int64_t kMoreMemory = 4 << 20;  // bytes
 constexpr double kMoreError = 5e-4;            // m
 constexpr auto kUnfinished = static_cast<int>(dashpot::analysis::Status::kUnfinished);
@@ -99,7 +99,7 @@ class Listener {
   std::thread thread_;
 };
 
-/// What the process holds.
+/// Resources of the process.
 struct Footprint {
   std::int64_t memory = 0;  ///< resident, bytes
   std::int64_t descriptors = 0;
@@ -118,8 +118,8 @@ Footprint footprint() {
           entries("/proc/self/task")};
 }
 
-/// What the thread beside the loop does in each second of a cycle. Throws std::runtime_error if the
-/// controller answers otherwise than it should.
+/// The work of the thread beside the loop in each second of a cycle. Throws std::runtime_error if
+/// the controller answers otherwise than it should.
 class Operator {
  public:
   Operator(dashpot_controller* controller, std::string url)
@@ -148,7 +148,7 @@ class Operator {
                              dashpot_last_error());
   }
 
-  /// `stiffness` in N/m and `damping` in N s/m; those of rotation are a tenth.
+  /// `stiffness` in N/m and `damping` in N s/m; a tenth of the numbers for rotation.
   void set_gains(double stiffness, double damping, double ratio, std::int32_t expected) {
     Eigen::Matrix<double, 6, 1> shares;
     shares << 1, 1, 1, 0.1, 0.1, 0.1;

@@ -30,7 +30,7 @@ constexpr const char* kSoakConfig =
     "robot: {urdf: panda.urdf, base: panda_link0, tip: panda_hand_tcp}\n"
     "analysis: {sampled: {interval: 100 ms}}\n";
 
-/// What the loop saw in some whole cycles.
+/// Results of the loop in some whole cycles.
 struct LoopInterval {
   std::int64_t number = 0;  ///< from 1
   std::int64_t ticks = 0;
@@ -47,7 +47,7 @@ struct LoopInterval {
 /// begins with a fault, positions that are lost for 20 ms, which somebody else has to release.
 class SoakLoop {
  public:
-  /// `controller` is one of kSoakConfig; nobody else may call its dashpot_update. The loop wakes
+  /// `controller` is one of kSoakConfig; only this loop may call its dashpot_update. The loop wakes
   /// every `period`, ns, and lives through a millisecond. Throws sim::InvalidRobot.
   SoakLoop(dashpot_controller* controller, std::int64_t period, std::int64_t cycles,
            std::int64_t cycles_of_interval)

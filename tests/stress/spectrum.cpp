@@ -113,7 +113,7 @@ bool is_refusal(Status status) {
   return status != Status::kOk && status != Status::kUncertified;
 }
 
-/// What the solver makes of a system; and the tracker, which comes from a system nearby.
+/// The solver's results for a system, and the tracker's, which comes from a system nearby.
 struct Judgements {
   Judgement direct, tracked;
 };

@@ -1,6 +1,6 @@
 // Follows the modes along random paths of every family of tests/support/tracker_paths.hpp, and
-// checks every published bound against eigenvalues in long double; what comes near its bound, and
-// every hundredth step besides, against those that FLINT/Arb proves.
+// checks every published bound against eigenvalues in long double; errors near their bound, and
+// every hundredth step, also against eigenvalues that FLINT/Arb proves.
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/paths.hpp>
 #include <dashpot/tests/support/enclosure.hpp>

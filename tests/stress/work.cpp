@@ -45,7 +45,7 @@ struct Destroy {
   void operator()(dashpot_controller* controller) const { dashpot_destroy(controller); }
 };
 
-/// What was seen of an arm.
+/// Observations of an arm.
 struct Seen {
   double seconds = 0, pressed = 0;  ///< of it, on the table
   double speed = 0, torque = 0;     ///< greatest shares of the limits
@@ -54,7 +54,7 @@ struct Seen {
   std::map<std::int32_t, long> ticks;  ///< with each status
 };
 
-/// An arm that works for some rounds, with links and bodies that weigh so many times what is told.
+/// An arm that works for some rounds, with links and bodies of `factor` times their stated masses.
 class Work {
  public:
   Work(const TestArm& arm, double factor, int rounds, std::mt19937_64& engine, Seen& seen)
@@ -118,7 +118,7 @@ class Work {
     doing_ = "moves its joints";
     joints_ = home_ + round.away;
     while (body_->tip_pose(joints_).position.z() < start_.position.z() - 0.75 * kTable) {
-      joints_ = 0.5 * (joints_ + home_);  // nobody drives an arm into a table
+      joints_ = 0.5 * (joints_ + home_);  // an arm is not driven into a table
     }
     cartesian_ = false;
     run(3);  // soft springs, friction and wrong weights leave 0.2 m
@@ -144,7 +144,7 @@ class Work {
     cartesian_ = true;
     goal_ = {start_.position + to, start_.rotation};
   }
-  /// The body has come or gone; it is told a little later.
+  /// The body has come or gone; the payload is set a little later.
   void hold(double mass, double late, double seconds) {
     doing_ = "takes or puts down a body";
     run(late);
@@ -234,7 +234,7 @@ class Work {
     for (long i = std::lround(seconds / kPeriod); i > 0; --i) tick();
   }
 
-  /// Weight and the Jacobian of the tip, as they are told.
+  /// Weight and the Jacobian of the tip, by the controller's model.
   std::pair<JointVector, Eigen::MatrixXd> terms(const JointVector& q) {
     dashpot_dynamics dynamics{};
     dynamics.struct_size = sizeof dynamics;

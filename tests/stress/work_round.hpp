@@ -1,5 +1,5 @@
 #pragma once
-// What an arm has to do in a round of ordinary work, and what it meets there.
+// The tasks of an arm in a round of ordinary work, and its disturbances.
 
 #include <dashpot/tests/stress/safety_arms.hpp>
 #include <dashpot/tests/support/places.hpp>
@@ -21,7 +21,7 @@ constexpr double kTable = 0.2;  ///< m below where the tip starts
 constexpr double kHeld = 5, kPutDown = 12, kTapped = 26, kPushed[] = {1, 30.5};
 constexpr double kPush = 40;  ///< N, for 0.7 s, by a hand that takes 0.1 s to press so hard
 
-/// What a round of work has of its own.
+/// The random values of a round.
 struct Round {
   Vector3d pick, place;    ///< from where the tip starts, m; z is not used
   Vector3d wipe;           ///< along the table, m
@@ -29,7 +29,7 @@ struct Round {
   Vector3d shake;          ///< amplitude of the hand at 4 Hz, m
   Vector3d tap;            ///< for 10 ms, N
   Vector3d push;           ///< for 0.7 s, N
-  double mass, told_late;  ///< of the body as it is told, kg; s after it is held or put down
+  double mass, told_late;  ///< of the payload as set, kg; s after it is held or put down
   double stiffer;          ///< than the default, a factor
   JointVector away;        ///< rad, a move of the joints
 };

@@ -83,9 +83,9 @@ class ArmLoop {
   analysis::System<analysis::kMaxDof> system_;
 };
 
-/// What is wrong with the modes of a tick, or odd.
+/// Faults and oddities of a tick's modes.
 struct ModeWatch {
-  long modes = 0;      ///< compared with those of the tick before; soft ones are not
+  long modes = 0;      ///< compared with the modes of the tick before; soft ones are not
   long separated = 0;  ///< whose identity the eigenvalues alone decide
   long lost = 0;       ///< of these, those that were given another place
   long not_numbers = 0, bounds_missing = 0;

@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/analysis/base/compiled_eigen.hpp>
 
-/// What tests use of Eigen besides.
+/// Further parts of Eigen that tests use.
 #ifndef DASHPOT_COMPILED_FOR_TESTS_HERE
 #define DASHPOT_COMPILED_FOR_TESTS_HERE extern
 #endif

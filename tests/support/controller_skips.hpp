@@ -1,5 +1,5 @@
 #pragma once
-// What the controller leaves out where a tick does not need it, beside a controller that does it.
+// Terms that the controller leaves out in some ticks, beside a controller that computes them.
 
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/robot_model.hpp>
@@ -102,8 +102,8 @@ struct LedPair {
   LedPair(const controller::RobotModel& model, const Settings& of_lean, const Settings& of_full)
       : lean(model, quiet(of_lean), kSmallSwing), full(model, quiet(of_full), kSmallSwing) {}
 
-  /// A halt in every other tenth of a second; `both` changes the input, `of_full` that of the
-  /// second arm alone.
+  /// A halt in every other tenth of a second; `both` changes the input, `of_full` the second arm's
+  /// alone.
   void tick(const Input& both, const Input& of_full) {
     const bool moves = ++ticks / 100 % 2 == 0;
     if (moves) t_ += 1e-3;
@@ -163,12 +163,12 @@ inline void compare_modes(LedPair& pair, SkipTally& tally) {
   compare_bounded(plain_modes(lean), plain_modes(full), full.zero_modes, kSameModes, tally);
 }
 
-/// What a tick leaves out: `lean` input allows it, `full` input is next to it and does not.
+/// A term that a tick leaves out: `lean` input allows it, the adjacent `full` input does not.
 struct TermSkip {
   SkipTally tally;
   std::function<void(controller::Settings& lean, controller::Settings& full)> settings;
   LedPair::Input both, of_full;
-  /// How often it was left out, of counters of the first controller.
+  /// How often it was left out, by counters of the first controller.
   std::function<std::uint64_t(const LedPair&)> left_out;
 };
 
@@ -178,7 +178,7 @@ inline std::vector<TermSkip> term_skips() {
   using controller::Settings;
   const auto nothing = [](RobotState&, Setpoint&) {};
   const auto still = [](RobotState& state, Setpoint&) { state.velocity.setZero(); };
-  // How the null space turns counts with a load, or under way, alone.
+  // The rotation of the null space only counts with a load, or under way.
   const auto without_posture = [](controller::Gains& gains) {
     gains.null_stiffness.setZero();
     gains.null_damping.setZero();

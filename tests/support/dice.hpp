@@ -1,6 +1,5 @@
 #pragma once
-// Random numbers and matrices from a seed, without a test around them; those of a test are in
-// random.hpp.
+// Random numbers and matrices from a seed, for programs; random.hpp is for tests.
 
 #include <Eigen/Core>
 #include <Eigen/QR>

@@ -1,6 +1,5 @@
 #pragma once
-// The sampled loop that is predicted for an arm with gears that bend, beside
-// the simulated one.
+// The predicted sampled loop of an arm with elastic joints, beside the simulated one.
 
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
@@ -172,7 +171,7 @@ class DrawnElasticLoop {
     settings.limits.torque.setConstant(1e4);
     settings.limits.torque_rate.setConstant(1e6);
     settings.limits.gain_margin = 1;
-    // Whatever brake the gears bear, it has nothing to do.
+    // The brake has nothing to do, however stiff the gears are.
     settings.limits.stopping_time = 100;
     settings.limits.velocity.setConstant(1e6);
     settings.limits.position_upper.setConstant(std::numeric_limits<double>::infinity());

@@ -66,7 +66,7 @@ class Matching {
 
 /// Whether each eigenvalue is within its bound of a true one, one to one; and natural frequency and
 /// damping ratio within theirs, where it is clear which two true eigenvalues are the mode's.
-/// `accuracy`: relative to the largest eigenvalue, that of the truth.
+/// `accuracy`: of the truth, relative to the largest eigenvalue.
 inline Verdict judge_against(const std::vector<LongComplex>& truth,
                              const analysis::TrackedSpectrum& spectrum, double accuracy) {
   using Long = long double;

@@ -84,7 +84,7 @@ struct LedArm {
     state.position = q;
     state.velocity = controller::JointVector::Zero(q.size());
   }
-  /// Where it swings at time t, one swing in 2 s.
+  /// Swings to the place of time t, one swing in 2 s.
   void swing(double t) {
     for (Eigen::Index i = 0; i < center.size(); ++i) {
       const auto shift = static_cast<double>(i);

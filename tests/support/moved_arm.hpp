@@ -135,7 +135,7 @@ struct MovedArm {
   static constexpr double kTick = 1e-3;
   static constexpr int kSines = 3;
 
-  /// Where the arm is to be.
+  /// The wanted motion.
   struct Path {
     Path(const controller::RobotModel& model, double speed, Dice& dice) {
       for (const controller::Joint& joint : model.joints()) {

@@ -21,7 +21,7 @@ struct MujocoOptions {
 /// A robot with its reflected inertias, friction, payload and gravity, in the world of a sim::Arm:
 /// whether friction acts, a wall at the tip, wrenches on the tip. With `stops` MuJoCo's own stops
 /// act at the position limits. Coulomb friction is MuJoCo's `frictionloss`: a joint that it holds
-/// stands still, where that of sim::Arm creeps.
+/// stands still, while a joint of sim::Arm creeps.
 class MujocoArm {
  public:
   using JointVector = sim::JointVector;
@@ -35,7 +35,7 @@ class MujocoArm {
                                          const JointVector& qd = {});
   virtual ~MujocoArm() = default;
 
-  /// Of coordinates. A joint with an elastic gear has two, one after the other: the drive, and the
+  /// Number of coordinates. An elastic joint has two, one after the other: the drive, and the
   /// link's deflection from it, whose torque is the gear's own.
   virtual int dof() const = 0;
   virtual double time() const = 0;  ///< since the start, s

@@ -1,6 +1,6 @@
 #pragma once
-// Hard second-order systems M q'' + C q' + K q = f of tests/data, in SI units. Their truth is that
-// of the stored doubles: the tests that use them have FLINT and Arb prove each number.
+// Hard second-order systems M q'' + C q' + K q = f of tests/data, in SI units. Their truth belongs
+// to the stored doubles: in the tests FLINT and Arb prove each number.
 
 #include <dashpot/analysis/system.hpp>
 #include <dashpot/tests/support/places.hpp>

@@ -1,6 +1,6 @@
 #pragma once
-// Where things of the tree and of the build stand. Their paths are compiled into places.cpp alone,
-// so that what is compiled for the tests is the same in every folder, and ccache knows it again.
+// Places in the tree and in the build. Their paths are compiled into places.cpp alone, so that all
+// other files are compiled alike in every folder, and ccache finds them again.
 
 #include <string>
 

@@ -1,6 +1,6 @@
 #pragma once
-// What a simulation leaves out where a scene has none of it, beside the same scene with it, but
-// without effect.
+// Parts that a simulation leaves out if a scene lacks them, beside the same scene with such parts,
+// but without effect.
 
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
@@ -105,9 +105,9 @@ inline void run_skip(std::uint64_t seed, PlantSkip& skip) {
   }
 }
 
-/// A Panda that falls onto a wall below its tip, moved by adaptive steps: those of order 5 begin
-/// with the rates that the step before ended with, unless a contact changed; those of order 8
-/// evaluate them again.
+/// A Panda that falls onto a wall below its tip, moved by adaptive steps. Steps of order 5 begin
+/// with the last rates of the step before, unless a contact changed; steps of order 8 evaluate them
+/// again.
 inline void run_contact_skip(std::uint64_t seed, SkipTally& tally) {
   constexpr int kTicks = 300;
   constexpr double kAllowed = 1e-7;  // rad and rad/s, of a tolerance of 1e-10 a step

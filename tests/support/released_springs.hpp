@@ -70,7 +70,7 @@ struct SprungArm {
     return A;
   }
 
-  /// How it moves from `position` at rest, n x samples `period` (s) apart.
+  /// Returns the motion from `position` at rest, n x samples `period` (s) apart.
   Eigen::MatrixXd release(const Eigen::VectorXd& position, int samples, double period) const {
     const Eigen::Index n = position.size();
     const Eigen::EigenSolver<Eigen::MatrixXd> solver(state_matrix());
@@ -85,7 +85,7 @@ struct SprungArm {
     return motion;
   }
 
-  /// How it moves with flawed joints from `position` at rest, n x samples 1 ms apart.
+  /// Returns the motion with flawed joints from `position` at rest, n x samples 1 ms apart.
   Eigen::MatrixXd release(const Flaw& flaw, const Eigen::VectorXd& position, int samples) const {
     constexpr int kParts = 10;
     constexpr double kStep = 1e-3 / kParts, kSticks = 1e-3;  // s, rad/s
@@ -107,8 +107,8 @@ struct SprungArm {
     return motion;
   }
 
-  /// How it moves under random torques that change each `period` (s), whose spread in each joint is
-  /// what turns the joint's inertia at `strength` (rad/s^2): n x samples.
+  /// Returns the motion under random torques that change each `period` (s) and whose spread
+  /// accelerates each joint's inertia by `strength` (rad/s^2): n x samples.
   Eigen::MatrixXd shake(double strength, int samples, double period, Dice& draw) const {
     const Eigen::Index n = system.mass.rows();
     const Eigen::MatrixXd A = state_matrix();
@@ -130,8 +130,8 @@ struct SprungArm {
     return motion;
   }
 
-  /// How it moves from rest under torques `shape` u, each value of u held for `period` (s): n x
-  /// samples. `shares`: of each mode in the motion, whose squares are weighted by the mass.
+  /// Returns the motion from rest under torques `shape` u, each value of u held for `period` (s):
+  /// n x samples. `shares`: of each mode in the motion, whose squares are weighted by the mass.
   Eigen::MatrixXd drive(const Eigen::VectorXd& shape, const Eigen::VectorXd& u, double period,
                         std::vector<double>& shares) const {
     const Eigen::Index n = system.mass.rows();
@@ -163,7 +163,7 @@ struct SprungArm {
   }
 };
 
-/// What sensors make of a motion.
+/// The effects of sensors on a motion.
 struct Sensors {
   double noise = 1e-5;    ///< rad, standard deviation
   double resolution = 0;  ///< rad; 0: none

@@ -16,7 +16,7 @@
 #endif
 
 namespace dashpot::testing {
-/// How long a test waits for what another thread or program does: only a hang takes so long.
+/// Longest wait of a test for another thread or program: only a hang takes so long.
 inline constexpr std::chrono::seconds kHang{120};
 
 /// Whether to leave out what takes long and runs the code of other tests, too: CTest says so where

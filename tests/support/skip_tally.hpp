@@ -1,5 +1,5 @@
 #pragma once
-// What is left out must change nothing: numbers with and without it, compared.
+// Terms that are left out must change nothing: numbers with and without them, compared.
 
 #include <dashpot/tests/support/enclosure.hpp>
 

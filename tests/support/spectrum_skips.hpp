@@ -1,6 +1,6 @@
 #pragma once
-// What ModeTracker and SpectrumSolver leave out where a system does not need it, beside the same
-// system with all of it.
+// Terms that ModeTracker and SpectrumSolver leave out if a system does not need them, beside the
+// same system with all terms.
 
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/skip_tally.hpp>

@@ -1,5 +1,5 @@
 #pragma once
-// What tests of systems {M, C, K} share.
+// Shared by tests of systems {M, C, K}.
 
 #include <dashpot/analysis/system.hpp>
 #include <dashpot/tests/support/special_values.hpp>
@@ -38,7 +38,7 @@ inline std::vector<LongComplex> eigenvalues_by_eigen(const LongMatrix& A) {
   return {values.begin(), values.end()};
 }
 
-/// Where the one of `all` is that is nearest to this.
+/// Returns an iterator to the value of `all` nearest to this.
 template <class Values>
 auto nearest_to(const LongComplex& value, Values& all) {
   return std::min_element(all.begin(), all.end(), [&](const LongComplex& a, const LongComplex& b) {
@@ -96,8 +96,8 @@ LongMatrix energy_state_matrix(const analysis::System<N>& system) {
   return A;
 }
 
-/// Computed in long double: those of the modes, and the rates of zero modes, with their zeros where
-/// K has no factor.
+/// Eigenvalues in long double, of the modes and the rates of zero modes, with their zeros if K has
+/// no factor.
 template <int N>
 std::vector<LongComplex> true_eigenvalues(const analysis::System<N>& system) {
   return eigenvalues_by_eigen(energy_state_matrix(system));

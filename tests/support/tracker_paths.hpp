@@ -173,8 +173,8 @@ inline SystemPath coinciding(Dice& dice) {
   };
 }
 
-/// Modes that coincide throughout while all shapes turn, as those of a moving arm whose stiffness
-/// is a multiple of its mass.
+/// Modes that coincide throughout while all shapes turn, as in a moving arm whose stiffness is a
+/// multiple of its mass.
 inline SystemPath turning_coinciding(Dice& dice) {
   const int n = dice.integer(2, 7), equal = dice.integer(2, n);
   const Eigen::MatrixXd T = dice.congruence(n, 2), turn = 0.3 * dice.matrix(n, n);

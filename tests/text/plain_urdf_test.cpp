@@ -1,4 +1,4 @@
-// What of a URDF a parser of version 1.0 gets to see.
+// The parts of a URDF that a parser of version 1.0 reads.
 #include <dashpot/tests/support/dice.hpp>
 #include <dashpot/text/plain_urdf.hpp>
 

@@ -1,4 +1,4 @@
-// What a terminal is shown of text that others wrote.
+// Text of others as a terminal shows it.
 #include <dashpot/text/printable.hpp>
 
 #include <gtest/gtest.h>

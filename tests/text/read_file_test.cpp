@@ -36,7 +36,7 @@ TEST(ReadFile, HasALimit) {
   EXPECT_EQ(refusal(scratch.write("b", std::string(1u << 20, 'x'))), "read");
 }
 
-// A pipe nobody writes to would keep the caller waiting for ever, and /dev/zero never ends.
+// A pipe without a writer would keep the caller waiting for ever, and /dev/zero never ends.
 TEST(ReadFile, RefusesWhatIsNoFile) {
   const tests::Scratch scratch;
   const std::string pipe = scratch.path("pipe");

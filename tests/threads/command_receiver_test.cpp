@@ -260,7 +260,7 @@ TEST(CommandReceiver, JudgesGainsOnItsOwnThread) {
   ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
 }
 
-// The state says that nobody commands, though no message comes that could say so.
+// The state reports the missing commander, although no message announces it.
 TEST(CommandReceiver, LetsGoOfASilentSender) {
   const auto bus = open_bus("memq://");
   CommandLimits limits = patient_limits();

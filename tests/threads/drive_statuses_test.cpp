@@ -1,5 +1,5 @@
-// What `dashpot drive` sends to a driver whose statuses are written by hand: at its end, after a
-// pause, and when statuses are not what they should be.
+// Commands of `dashpot drive` to a driver whose statuses are written by hand: at its end, after a
+// pause, and after wrong statuses.
 #include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/threads/drive_arms.hpp>
 
@@ -196,7 +196,7 @@ TEST_P(DriveStatuses, AnArmWhoseStateIsLostForLongEndsIt) {
   writer.steps(5);
   writer.next.position = place;
   writer.steps(5);
-  EXPECT_FALSE(driving.ended());  // a few are no fault
+  EXPECT_FALSE(driving.ended());  // a few do not count as a fault
   writer.next.position.setConstant(std::numeric_limits<double>::quiet_NaN());
   ends("state not finite", "");
 }

@@ -59,7 +59,7 @@ class Drive : public AtPace, public ::testing::WithParamInterface<Arm> {
     fake_said = fake.complaints();
     return Json::parse(driving.output());
   }
-  /// Holds the arm, and moves it where it is told.
+  /// Holds the arm, and moves it by commands.
   void hold_and_move();
   /// Neither gaps of a machine that is busy nor old commands end anything.
   std::string patient_configuration(const Scratch& scratch) const {
@@ -221,7 +221,7 @@ TEST_P(Drive, RefusesALoopThatIsNotTheDrivers) {
   EXPECT_THAT(refusal("delay: 1", "delay: 0"), HasSubstr("analysis.sampled.delay: must be"));
   EXPECT_THAT(refusal(iiwa ? ", difference_velocity: true" : ", cutoff: 27.484 Hz", ""),
               HasSubstr(iiwa ? "difference_velocity: must be true" : "cutoff: must be that of"));
-  // Dampers that the wrist does not bear are refused before the first torque.
+  // Dampers that are too strong for the wrist are refused before the first torque.
   EXPECT_THAT(refusal("damping_ratio: 0.8", "damping: [20, 20, 10, 10, 20, 10, 4]"),
               HasSubstr("gain margin"));
 }
@@ -252,7 +252,7 @@ void command_as_well(const Arm& arm, const std::string& url, Running& driving) {
   }
 }
 
-/// Statuses of an arm that nobody simulates, every millisecond: it trembles about one posture.
+/// Statuses of an arm without a simulation, every millisecond: it trembles about one posture.
 class TremblingArm {
  public:
   /// With `fixed`, the driver commands that posture; otherwise what it measures.
@@ -395,8 +395,8 @@ void watch(std::vector<Watched>& all) {
   }
 }
 
-/// Gains that Drake's iiwa bears at 1 ms, rings with at 5 ms, and does not bear with more damping
-/// of the wrist. No driver runs: they are judged before the first status.
+/// Gains with which Drake's iiwa keeps its margin at 1 ms, rings at 5 ms, and loses its margin with
+/// more damping of the wrist. No driver runs: they are judged before the first status.
 TEST_F(DriveOfAnIiwa, JudgesGainsForThePeriod) {
   const Scratch scratch;
   struct Judged {
@@ -451,7 +451,7 @@ TEST_F(DriveOfAnIiwa, RefusesSpringsOfKukas) {
 
 /// Springs of KUKA's that commands lead to where the arm is hold nothing, and damp.
 TEST_F(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
-  // So small that the simulated loop, whose springs act from period to period, bears them.
+  // So small that the simulated loop, whose springs act from period to period, tolerates them.
   const std::string springs = "[1000, 1000, 1000, 500, 100, 20, 5]";  // N m/rad
   const std::string dampers = "[4, 4, 2, 2, 0.3, 0.1, 0.01]";         // N m s/rad
   const std::string in_all = "[5, 5, 3, 2.5, 0.4, 0.12, 0.015]";      // and a period's lag

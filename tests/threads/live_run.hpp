@@ -30,7 +30,7 @@ inline nlohmann::json summary_of(Running& loop) {
   return result;
 }
 
-/// What comes over a bus.
+/// Collects the messages of a bus.
 class Listener {
  public:
   explicit Listener(const std::string& url) : bus_(lcmtypes::open_bus(url)) {

@@ -148,8 +148,7 @@ void expect_same_modes(const analysis::Spectrum<>& found, const analysis::Spectr
   }
 }
 
-/// The latest result of a controller that stands at the posture; null if the settings are none that
-/// it takes.
+/// The latest result of a controller that stands at the posture; null if it refuses the settings.
 void expect_of_tick(const Case& one, const Said& wanted, int& ticked) {
   Settings settings = one.settings;
   settings.initial.mode = one.mode;
@@ -264,7 +263,7 @@ TEST(OneLoop, CountsThatGravityIsCompensatedLate) {
   expect_same_margin(verdict.margin, audited(false));
 }
 
-/// The names of what is left out.
+/// The names of the parts that are left out.
 TEST(OneLoop, SaysWhatItLeavesOut) {
   const RobotModel bare = testing::smooth_panda();
   ModelOptions options;

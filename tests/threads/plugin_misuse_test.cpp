@@ -128,7 +128,7 @@ TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
   EXPECT_STREQ(plugin().last_error(), "nothing to read so far");
 }
 
-/// A wrong state is no refusal: the weight is held, and the controller recovers.
+/// A wrong state does not end the loop: the weight is held, and the controller recovers.
 TEST(Plugin, IsSafeWithoutAState) {
   Host host = panda_host("watchdog: {feedback: 0}\n");  // the arm stays where it is
   for (int tick = 0; tick < 200; ++tick) ASSERT_EQ(host.tick(), DASHPOT_OK);

@@ -49,7 +49,7 @@ Found analyze(const Handle& arm, std::int32_t mode, const dashpot_gains* gains =
   return found;
 }
 
-/// The modes of `found` are those of its matrices.
+/// The modes of `found` belong to its matrices.
 void expect_modes_of_the_matrices(const Found& found, std::uint32_t count) {
   ASSERT_EQ(found.modes.status, 0);
   ASSERT_EQ(found.modes.count, count);
@@ -88,12 +88,12 @@ TEST(PluginPosture, HasTheDynamicsOfTheRobot) {
   EXPECT_EQ(R, MatrixXd(expected.R_BT));
 }
 
-/// What it finds without a loop is what a loop publishes once it has the gains.
+/// It finds without a loop the modes that a loop publishes once it has the gains.
 TEST(PluginPosture, FindsTheModesThatALoopPublishes) {
   MatrixXd K = 100 * MatrixXd::Identity(7, 7), C = MatrixXd::Zero(7, 7);
   C.diagonal() << 10, 10, 8, 8, 2, 2, 0.3;
   K(1, 2) = K(2, 1) = 20;
-  const MatrixXd friction = 0.003 * MatrixXd::Identity(7, 7);  // that of the URDF
+  const MatrixXd friction = 0.003 * MatrixXd::Identity(7, 7);  // as in the URDF
   dashpot_gains gains = panda_gains();
   gains.joint_stiffness = K.data();
   gains.joint_damping = C.data();
@@ -140,7 +140,7 @@ TEST(PluginPosture, KnowsARobotWithoutSprings) {
   EXPECT_EQ(rows(found.loop.damping, 7, 7)(0, 0), 3 + 0.003);
 }
 
-/// Beside a loop on another thread, which goes on as if nobody asked.
+/// Beside a loop on another thread, which continues as if without the call.
 TEST(PluginPosture, DisturbsNoLoop) {
   std::vector<double> torques[2];
   for (const bool asked : {false, true}) {

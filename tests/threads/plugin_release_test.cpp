@@ -1,4 +1,4 @@
-// What is left of set-points and gains when a fault is released.
+// The set-points and gains that remain when a fault is released.
 #include <dashpot/tests/plugin/panda_host.hpp>
 
 #include <cmath>

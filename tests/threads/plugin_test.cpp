@@ -350,7 +350,7 @@ TEST(Plugin, RefusesAStartThatCannotBe) {
   }
 }
 
-/// A wrist that weighs next to nothing bears less damping than a shoulder.
+/// A wrist that weighs next to nothing tolerates less damping than a shoulder.
 TEST(Plugin, RefusesGainsThatTheSampledLoopDoesNotBear) {
   const std::string stiff = "gains: {joint: {stiffness: 100, damping: [20, 20, 20, 20, 20, ";
   // The last joint turns about its own axis: its inertia is the same everywhere.
@@ -381,7 +381,7 @@ TEST(Plugin, RefusesGainsThatTheSampledLoopDoesNotBear) {
   EXPECT_GT(margin, 0.05);
   EXPECT_LT(margin, 1);
   EXPECT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_UNSTABLE_GAINS);
-  const Handle fresh = create(panda());  // nobody knows where its robot is
+  const Handle fresh = create(panda());  // the position of its robot is unknown
   EXPECT_EQ(plugin().set_gains(fresh.get(), &gains), DASHPOT_UNSTABLE_GAINS);
   for (std::size_t i = 0; i < 7; ++i) damping[8 * i] = 20 * 0.45 * margin;
   EXPECT_EQ(plugin().set_gains(fresh.get(), &gains), DASHPOT_OK);
@@ -407,7 +407,7 @@ TEST(Plugin, HasNoModesAfterAReset) {
   }
 }
 
-/// Six modes of the task with the ratio that is held, or with those of a damping matrix again.
+/// Six modes of the task with the held ratio, or with the ratios of a damping matrix again.
 TEST(Plugin, HoldsADampingRatio) {
   Host host(create("robot: {urdf: " + urdf_path("panda.urdf") +
                    ", base: panda_link0, tip: panda_hand_tcp, viscous_friction: 0}\n"

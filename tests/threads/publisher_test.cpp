@@ -1,4 +1,4 @@
-// What the real-time thread offers is published once, in order, and never holds it up.
+// Data of the real-time thread is published once, in order, and never holds the thread up.
 #include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
@@ -20,7 +20,7 @@ using ::testing::ElementsAre;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// What a sink has got; it may be held up.
+/// The data that a sink has received; it may be held up.
 struct Received {
   std::mutex mutex;
   std::condition_variable changed;

@@ -34,7 +34,7 @@ TEST(RunWithCommands, TakesGoodCommandsAndKeepsTheLastOne) {
   live.bus().publish(lcmtypes::kCommandChannel, noise.data(), 300U);
   EXPECT_TRUE(live.until([&] { return live.state.commands_rejected == 4; }));
   EXPECT_EQ(live.state.commands_accepted, 1);
-  // Nobody sends any more, and the robot goes where it was told, without a complaint.
+  // No more commands come, and the robot goes to its last goal, without a complaint.
   EXPECT_TRUE(live.until([&] {
     return live.state.mode == state_t::JOINT &&
            std::abs(live.state.reference_joint_position[0] - 0.1) < 1e-9;
@@ -53,7 +53,7 @@ TEST(RunWithCommands, TakesGoodCommandsAndKeepsTheLastOne) {
                                         {"not the bytes of a command", 1}}));
   EXPECT_EQ(commands["last_refusal"]["verdict"], "not the bytes of a command");
   EXPECT_EQ(commands["last_refusal"]["sender"], 0);
-  EXPECT_EQ(commands["commander"], 0);  // nobody, by now
+  EXPECT_EQ(commands["commander"], 0);  // none, by now
 }
 
 TEST(RunWithCommands, TakesNoCommandsUnlessItIsAskedTo) {

@@ -34,8 +34,8 @@ double distance(const double (&a)[3], const double (&b)[3]) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-/// An arm that holds its tip gets another T: nothing moves but T, and the modes become those of an
-/// arm that was configured with it.
+/// An arm that holds its tip gets another T: nothing moves but T, and the modes become the modes of
+/// an arm that was configured with it.
 TEST(RunWithCommands, MovesTheToolFrameOfAnArmAtRest) {
   const Scratch scratch, with_tool;
   std::vector<std::pair<std::string, std::string>> changes = {
@@ -126,7 +126,7 @@ TEST(RunWithCommands, MovesTheToolFrameOfAnArmAtRest) {
     return distance(live.state.reference_tip_position, wanted_tip) < 1e-9 &&
            distance(live.state.tip_position, wanted_tip) < 1e-3;
   }));
-  // What the scene does not allow is refused.
+  // Commands that the scene does not allow are refused.
   command.tool_position[2] = 0.21;
   send(command, command_t::TOOL_FRAME);
   ASSERT_TRUE(until([&] { return live.state.verdicts[state_t::OUT_OF_LIMITS] == 1; }));
@@ -134,7 +134,7 @@ TEST(RunWithCommands, MovesTheToolFrameOfAnArmAtRest) {
   live.end();
 }
 
-/// Where a scenario wants the tip is a place of the configuration's T, whatever was told since.
+/// A scenario's tip targets refer to the configuration's T, also after commands have changed T.
 TEST(RunWithCommands, GoesWhereTheScenarioWantsTheTipLinkWithAnotherTool) {
   const Scratch scratch;
   const std::string file =

@@ -1,4 +1,4 @@
-// What is too much for one tick goes on in the background, and says so.
+// An analysis that is too long for one tick continues in the background, and reports it.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
@@ -125,7 +125,7 @@ TEST_P(VibrationShare, IsKeptWhateverTheGainsAre) {
   EXPECT_GT(counters.tracked, counted);
 }
 
-/// What cannot be followed is not tried in every tick again.
+/// Modes that cannot be followed are not tried in every tick again.
 TEST_P(VibrationShare, IsNotSpentInVain) {
   SharedTick arm(GetParam(), 1e-3);  // nothing fits
   int tried = 0;

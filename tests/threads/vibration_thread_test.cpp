@@ -30,7 +30,7 @@ struct SwingingArm : testing::LedArm {
     if (!moving) state.velocity.setZero();
     LedArm::tick();
   }
-  /// Ticks without a motion, which are nothing new to analyse, until the modes are those of `tick`.
+  /// Ticks without a motion, with nothing new to analyse, until the modes belong to `tick_number`.
   bool wait_for(std::uint64_t tick_number) {
     using std::chrono::steady_clock;
     const auto end = steady_clock::now() + testing::kHang;
@@ -111,7 +111,7 @@ TEST(VibrationThread, KeepsUpAsFarAsItCan) {
   EXPECT_EQ(due_ticks(apart.controller.vibration().counters), 3000u);
 }
 
-/// What was found before a reset is not shown after it.
+/// Modes from before a reset are not shown after it.
 TEST(VibrationThread, ForgetsAtAReset) {
   const RobotModel model = panda_model();
   SwingingArm arm(model, Analysis::Where::kBackground);
