@@ -44,6 +44,15 @@ struct Integral {
   JointVector torque;  ///< |t_i|, n, N m
 };
 
+/// Where the energy comes from that growing stiffness, moving references and feed-forward put in.
+struct Energy {
+  enum class From : std::uint8_t {
+    kFree,  ///< from the motors, without a bound
+    kTank,  ///< from what is stored, and what dampers took out: see EnergyTank
+  } from = From::kFree;
+  double store = 10;  ///< that the controller may give beyond what it took, J
+};
+
 /// How the wrench f that the world exerts on the tip, RobotState::external_wrench, moves with the
 /// arm, for the analysis. closed_loop.hpp says which stiffness each of them adds.
 enum class Load : std::uint8_t {
@@ -190,6 +199,7 @@ struct Settings {
   double period = 0.001;  ///< of the control loop, s
   FeedForward feed_forward;
   Integral integral;
+  Energy energy;
   TaskTerms task_terms;
   NullProjector null_projector = NullProjector::kDynamic;
   Environment environment;

@@ -19,7 +19,7 @@ struct Setting {
 
 /// Calls visit(setting, member) for every setting but the gains and the walls. `Struct` is
 /// Settings or const Settings. Members are double, int, bool, JointVector (n entries), Vector6 (of
-/// the tip), Mode, Load, NullProjector, Analysis::Where and FeedForward::FrictionAt.
+/// the tip), Mode, Load, NullProjector, Energy::From, Analysis::Where and FeedForward::FrictionAt.
 template <class Struct, class Visitor>
 void for_each_setting(Struct& settings, Visitor&& visit) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -27,6 +27,8 @@ void for_each_setting(Struct& settings, Visitor&& visit) {
   visit(Setting{"control.mode"}, settings.initial.mode);
   visit(Setting{"control.load"}, settings.task_terms.load);
   visit(Setting{"control.null_projector"}, settings.null_projector);
+  visit(Setting{"control.energy"}, settings.energy.from);
+  visit(Setting{"control.energy_store", "J", "", text::kPositive}, settings.energy.store);
   visit(Setting{"control.jacobian_rate"}, settings.task_terms.jacobian_rate);
   visit(Setting{"control.subtract_friction"}, settings.subtract_friction);
 

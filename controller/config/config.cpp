@@ -103,6 +103,12 @@ class SettingsReader {
         {{"dynamic", NullProjector::kDynamic}, {"kinematic", NullProjector::kKinematic}}};
     read_choice(keys, key, kProjectors, value);
   }
+  static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+                   Energy::From& value) {
+    static constexpr std::array<std::pair<std::string_view, Energy::From>, 2> kSources = {
+        {{"free", Energy::From::kFree}, {"tank", Energy::From::kTank}}};
+    read_choice(keys, key, kSources, value);
+  }
   static void read(const text::YamlMapping& keys, std::string_view key, const Setting& setting,
                    Vector6& value) {
     const std::string& linear = setting.unit;

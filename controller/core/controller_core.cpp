@@ -19,6 +19,7 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       generator_(model, settings),
       law_(model, settings.feed_forward),
       integral_(settings.integral, settings.period),
+      tank_(model, settings),
       filter_(settings, gears_stopping_time(model, settings, Brake(settings).stopping_time())),
       analysis_(model, settings),
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
@@ -43,6 +44,7 @@ void ControllerCore::reset(const JointVector& torque) noexcept {
   sensed_.any = false;
   sensed_.external_wrench.setZero();
   designed_.reset();
+  tank_.reset();
   analysis_.reset();
   snapshot_ = Snapshot();
   for (JointVector* vector :
@@ -55,6 +57,7 @@ void ControllerCore::reset(const JointVector& torque) noexcept {
 
 void ControllerCore::release() noexcept {
   faults_.release();
+  tank_.reset();
   forget_springs();
 }
 
@@ -118,6 +121,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   kernel_.evaluate(sensed_.q, sensed_.qd, sensed_.robot);
   if (settings_.feed_forward.gravity) sensed_.weight = sensed_.robot.gravity;
   filter_.assume(sensed_.weight);
+  if (tank_.on()) tank_.count_work(sensed_.q, sensed_.weight, sensed_.dt);
 
   // Take over the set-point.
   Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
@@ -152,10 +156,14 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
                     &impedance = designed_.update(setpoints_.gains(), sensed_.robot);
     const NullSpace& null_space = designed_.null_space();
     generator_.step(setpoints_, hold, sensed_, null_space);
-    law_.torque(
-        {sensed_.robot, sensed_.q, sensed_.qd, impedance, null_space, generator_.references(),
-         generator_.clamp(), setpoints_.wrench(), integral_.on() ? &integral_ : nullptr},
-        asked_);
+    const ImpedanceLaw::Input law{
+        sensed_.robot,           sensed_.q,          sensed_.qd,
+        impedance,               null_space,         generator_.references(),
+        generator_.clamp(),      setpoints_.wrench(), integral_.on() ? &integral_ : nullptr};
+    law_.torque(law, asked_);
+    if (tank_.on() && tank_.limit(law, sensed_.weight, asked_)) {
+      status = worse(status, Status::kTorqueLimited);
+    }
     torque = asked_.torque;
     level_ = designed_.level(given);
     // While gains change, dampers that fade keep the margin as well.
@@ -172,7 +180,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
       filter_.apply({sensed_.q, sensed_.qd, sensed_.robot, sensed_.weight, factor},
                     faults_.tip_speed(), aim_, asked_.dampers, torque);
   if (in_force() && integral_.on()) {
-    const bool may_grow = limits == Status::kOk && !asked_.clamped;
+    const bool may_grow = limits == Status::kOk && !asked_.clamped && tank_.share() == 1;
     if (setpoints_.changes() != integrated_) {
       integral_.fade(setpoints_.steps_left());
     } else if (!hold) {
@@ -212,6 +220,7 @@ void ControllerCore::brake() noexcept {
   if (aim_ == Aim::kSprings) filter_.begin_anew();
   aim_ = faults_.aim();
   integral_.reset();
+  tank_.no_springs();
   level_ = {};
   asked_.tip_error.setZero();
   asked_.tip_wrench.setZero();
@@ -231,8 +240,8 @@ LoopAnalysis::Loop ControllerCore::loop() const noexcept {
   }
   return {snapshot_.tick,
           sensed_,
-          springs,
-          {springs ? designed_.now(setpoints_.gains().now()) : brake_, designed_.null_space(),
+          springs ? tank_.share() : 0,
+          {springs ? tank_.active(designed_.now(setpoints_.gains().now())) : brake_, designed_.null_space(),
            springs ? friction_left_ : viscous_friction_, wrenches, posture},
           setpoints_.changes(),
           setpoints_.attachment().now()};
@@ -267,6 +276,8 @@ void ControllerCore::show() noexcept {
   shown.joint_damping_ratio = impedance.joint_damping_ratio;
   shown.task_damping_ratio = impedance.damping_ratio;
   shown.damping_level = level_.level;
+  if (tank_.on()) shown.energy_store = tank_.level();
+  shown.spring_share = tank_.share();
   shown.payload = setpoints_.attachment().now().payload();
   shown.tool = setpoints_.attachment().now().tool;
   if (!integral_.on()) return;
@@ -276,6 +287,7 @@ void ControllerCore::show() noexcept {
 
 Status ControllerCore::finish(Status status, const JointVector& torque) noexcept {
   snapshot_.torque = torque;
+  if (tank_.on()) tank_.apply(torque);
   snapshot_.status = status;
   snapshot_.fault = faults_.fault();
   analysis_.collect();

@@ -4,6 +4,7 @@
 #include <dashpot/controller/core/reference_generator.hpp>
 #include <dashpot/controller/core/setpoint_history.hpp>
 #include <dashpot/controller/law/designed_damping.hpp>
+#include <dashpot/controller/law/energy_tank.hpp>
 #include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/controller/safety/state_check.hpp>
 
@@ -64,6 +65,7 @@ class ControllerCore {
   ReferenceGenerator generator_;
   ImpedanceLaw law_;
   SpringIntegral integral_;
+  EnergyTank tank_;
   SafetyFilter filter_;
   LoopAnalysis analysis_;
   const JointVector viscous_friction_;  ///< of the robot, N m s/rad

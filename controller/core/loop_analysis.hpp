@@ -20,7 +20,7 @@ class LoopAnalysis {
   struct Loop {
     std::uint64_t tick;
     const Sensed& now;
-    bool springs;  ///< or the brake, or nothing
+    double springs;  ///< share of their stiffness that acts; 0: the brake or nothing does
     Acting acting;
     std::uint64_t changes;  ///< of gains and attachment so far
     const Attachment& attachment;
@@ -42,7 +42,7 @@ class LoopAnalysis {
  private:
   /// What the last analysis was of. qd, wrench and posture_error are zero where they do not matter.
   struct Analysed {
-    bool springs;
+    double springs;
     std::uint64_t changes;
     JointVector q, qd;
     Vector6 wrench;

@@ -1,0 +1,60 @@
+#pragma once
+#include <dashpot/controller/law/impedance_law.hpp>
+
+#include <array>
+
+namespace dashpot::controller {
+
+/// Bounds the energy that the controller gives to arm and surroundings, see Energy.
+///
+/// A torque is constant between two ticks, so that its work tau' (q_k+1 - q_k) is exact whatever
+/// the arm did in between. Of what Energy::store allows, the tank holds
+///     S = store - sum of (tau' dq - dU - friction dissipated),
+/// where dU = 1/2 (g_k + g_k+1)' dq is the change of the potential energy whose torque the
+/// controller compensates. E is the energy of the springs as they are stretched now,
+///     E = 1/2 (e_q' K_q e_q + e' K_C e + e_0' K_0 e_0).
+/// - Springs act with the share s = min(1, (S - reserve) / E) of their torque: they cannot release
+///   more than there is. Gains that grow and references that move away so wait for energy.
+/// - Feed-forward that adds energy shrinks as S - reserve - s E falls below a tenth of the store.
+/// - Dampers act in full, and what they dissipate returns to S, which is at most store + s E.
+/// Viscous friction of the model counts with b dq^2 / T, which it dissipates at least, and Coulomb
+/// friction with c (|dq| - 0.0028 rad/s T), less than c tanh(v / 0.01 rad/s) dissipates.
+class EnergyTank {
+ public:
+  EnergyTank(const RobotModel& model, const Settings& settings);
+
+  bool on() const noexcept { return store_ > 0; }
+  /// Fills the tank, and forgets the torques.
+  void reset() noexcept;
+  /// Counts the work since the last tick. `weight`: the gravity torque that is compensated, n.
+  void count_work(const JointVector& q, const JointVector& weight, double dt) noexcept;
+  /// Scales a torque of the law, in place. True if that changed it.
+  bool limit(const ImpedanceLaw::Input& law, const JointVector& weight, LawTorque& asked) noexcept;
+  /// No springs act.
+  void no_springs() noexcept { committed_ = 0, share_ = 1; }
+  /// Remembers a torque that was put out.
+  void apply(const JointVector& torque) noexcept;
+
+  /// Returns S, J.
+  double level() const noexcept { return level_; }
+  /// Returns the share s of the springs.
+  double share() const noexcept { return share_; }
+  /// Returns the springs and dampers that act, of those that are given.
+  const Impedance& active(const Impedance& given) const noexcept {
+    return share_ < 1 ? weakened_ : given;
+  }
+
+ private:
+  static constexpr std::size_t kMostDelay = 20;  // ticks, as analysis.sampled.delay
+
+  double store_;  ///< J; 0: there is no tank
+  double level_ = 0, committed_ = 0, share_ = 1;
+  std::size_t delay_, applied_ = 0;  ///< ticks; torques that were put out
+  bool known_ = false;               ///< q_ and weight_
+  Impedance weakened_;
+  JointVector viscous_, coulomb_;
+  JointVector q_, weight_;
+  std::array<JointVector, kMostDelay + 1> torques_;
+};
+
+}  // namespace dashpot::controller
