@@ -33,7 +33,7 @@ int report(const std::string& message, int status) {
   return status;
 }
 
-/// How many letters have to be changed, added or left out to make one word of the other.
+/// Edit distance: letters to change, add or leave out to make one word of the other.
 std::size_t distance(const std::string& one, const std::string& other) {
   std::vector<std::size_t> row(other.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -47,7 +47,7 @@ std::size_t distance(const std::string& one, const std::string& other) {
   return row.back();
 }
 
-/// The name that `word` may have been meant to be: a beginning of it, or few letters away; or "".
+/// The name that `word` may stand for: it begins with `word` or is few letters away; otherwise "".
 std::string nearest(const std::string& word, const std::vector<std::string>& names) {
   std::string result;
   std::size_t least = 1 + word.size() / 3;
@@ -76,7 +76,7 @@ std::string meant_subcommand(const CLI::App& program, const std::string& word) {
   return name.empty() ? "there are " + all : "did you mean " + name + "?";
 }
 
-/// "; did you mean --json?" for the first of the words that is an option nobody knows; or "".
+/// "; did you mean --json?" for the first unknown option among the words; otherwise "".
 std::string meant_option(const CLI::App& command, int argc, char** argv) {
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options()) {
@@ -138,7 +138,7 @@ int run(int argc, char** argv) {
   if (argc > 1 && argv[1][0] != '-') {
     const std::string meant = meant_subcommand(program, argv[1]);
     if (!meant.empty()) {
-      return report("dashpot: '" + std::string(argv[1]) + "' is no subcommand; " + meant +
+      return report("dashpot: '" + std::string(argv[1]) + "' is not a subcommand; " + meant +
                         " (dashpot --help)",
                     kBadInput);
     }

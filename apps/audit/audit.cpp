@@ -111,7 +111,7 @@ ends the sampling with what is done.
 void add_audit(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("audit", "What the gains of a controller really do on an arm");
-  command->alias("modes");  // the word for what many look for
+  command->alias("modes");  // the word that many look for
   const auto options = std::make_shared<AuditCommand>();
   add_audit_options(*command, *options);
   command->footer(std::string(kAuditHelp) + kUnitsHelp + "\n" + kExitStatusHelp);

@@ -33,7 +33,7 @@ std::vector<std::string> preset_names() {
   return names;
 }
 
-/// Sets the gains of a preset for n joints; all but the task's damping, which follows from the
+/// Sets the gains of a preset for n joints, except the task's damping, which follows from the
 /// factor.
 void take_preset(const std::string& name, int n, AuditOptions& audit) {
   const GainPreset& preset = *std::find_if(kPresets.begin(), kPresets.end(),
@@ -49,7 +49,7 @@ void take_preset(const std::string& name, int n, AuditOptions& audit) {
   audit.null_projector = controller::NullProjector::kKinematic;
 }
 
-/// Sets the gains that stand in a configuration file.
+/// Sets the gains of a configuration file.
 void read_gains_file(const std::string& path, const RobotModel& model, AuditOptions& audit) try {
   const text::YamlNode document = text::parse_yaml(text::read_regular_file(path));
   const text::YamlMapping root(document, "", controller::kConfigSections);
@@ -74,8 +74,8 @@ Matrix factor_damping(const std::string& option, double factor, const Matrix& K)
   return factor * K.cwiseSqrt();
 }
 
-/// A diagonal of the task's gains. Throws InputError for an entry that is negative: such a damper
-/// feeds energy in, and such a spring pushes away.
+/// A diagonal of the task's gains. Throws InputError for a negative entry: such a damper feeds
+/// energy in, and such a spring pushes away.
 Eigen::VectorXd gain_diagonal(const std::string& option, const std::string& text,
                               const text::Units& units) {
   Eigen::VectorXd values = parse_quantities(option, text, units);

@@ -45,7 +45,7 @@ std::string margins(const Numbers& numbers) {
   return lines.str();
 }
 
-/// A matrix of gains by its diagonal; says so where it has more.
+/// The diagonal of a matrix of gains; says so if other entries are not zero.
 std::string gains_text(const std::string& name, const Eigen::MatrixXd& gains) {
   const Eigen::VectorXd diagonal = gains.diagonal();
   return name + " = diag(" + format_list(diagonal, 3) + ")" +

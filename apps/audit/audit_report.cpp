@@ -53,7 +53,7 @@ std::string modes_table(const AuditTask& task, const controller::PostureAudit& p
   return table.text();
 }
 
-/// Returns what is not known because the model has no rotors; empty if it has.
+/// Returns what is unknown because the model has no rotors; empty if it has rotors.
 std::string rotors_table(const AuditTask& task, const controller::PostureAudit& posture) {
   const controller::RobotModel& model = task.model;
   const std::string missing = controller::missing_rotors_text(model);
@@ -64,7 +64,7 @@ std::string rotors_table(const AuditTask& task, const controller::PostureAudit& 
   const bool loop = task.options.period > 0;
   std::string text = used + "\n  Rotors unknown: " + missing + ". Fast modes" +
                      (loop ? ",\n  fastest pole, and gain margin" : "\n  and fastest pole") +
-                     " are those of " + controller::arm_without_rotors(model) + ".\n";
+                     " are computed for " + controller::arm_without_rotors(model) + ".\n";
   const controller::MissingRotors& rotors = posture.rotors;
   const std::string asked = format_number(task.options.margin, 3);
   if (rotors.inertia && !rotors.inertia->isZero(0)) {
@@ -88,7 +88,7 @@ std::string rotors_table(const AuditTask& task, const controller::PostureAudit& 
          "\n";
 }
 
-/// Returns what a gain margin means. A loop whose rotors are not told is not called unstable.
+/// Returns what a gain margin means. A loop is not called unstable if its rotors are unknown.
 std::string margin_verdict(const AuditTask& task, double margin) {
   if (margin >= 1) return "stiffness and damping may grow by it together.\n";
   return controller::unknown_rotors(task.model).any()

@@ -13,8 +13,8 @@ struct AuditReport {
   std::optional<controller::WorkspaceAudit> workspace;
   controller::DampingSuggestion suggestion;
   std::string no_suggestion;    ///< why there is none; empty if there is one
-  std::string lost_directions;  ///< of the task, where the posture is singular
-  bool interrupted = false;     ///< the workspace lacks postures
+  std::string lost_directions;  ///< of the task, if the posture is singular
+  bool interrupted = false;     ///< postures of the workspace are missing
 };
 
 std::string audit_json(const AuditTask& task, const AuditReport& report);
@@ -26,7 +26,7 @@ std::string csv_line(std::int64_t i, const controller::JointVector& q,
                      const controller::PostureNumbers& numbers);
 
 /// Draws the smallest ratios of many postures, and their gain margins if they have any, to a file
-/// whose name ends with .svg or .png. Throws std::runtime_error if gnuplot does not do it.
+/// whose name ends with .svg or .png. Throws std::runtime_error if gnuplot fails.
 void draw_audit(const std::string& path, const AuditTask& task,
                 const std::vector<controller::PostureNumbers>& numbers);
 

@@ -57,13 +57,13 @@ PostureContact contact_at(const Audit& audit, const JointVector& q, const Contac
   if (!found.held) return found;
   try {
     found.touch = controller::find_contact(audit, q, options);
-  } catch (const std::exception&) {  // a tip that is stuck, no convergence
+  } catch (const std::exception&) {  // the tip cannot move, or no convergence
   }
   return found;
 }
 
-/// Returns the limit at the posture with the published rotors where the model has none, NaN where
-/// there are none.
+/// Returns the limit at the posture with the published rotors in place of missing ones; NaN if none
+/// are published.
 double limit_with_rotors(const AuditTask& task, const ContactReport& report) {
   const controller::Drives* published = controller::unknown_rotors(task.model).published;
   if (published == nullptr) return std::numeric_limits<double>::quiet_NaN();
@@ -122,10 +122,10 @@ void run_contact(const ContactCommand& command) try {
 }
 
 constexpr const char* kContactHelp =
-    R"(What the arm may touch with its tip: the stiffness of an undamped spring up to which the
-sampled loop stays stable, in one direction or in the one that bears least; whether it is passive;
-and what the joints can hold. The bracket of the limit is proved at the posture. Ctrl-C ends the
-sampling with what is done.
+    R"(Prints up to which stiffness of an undamped spring at the tip the sampled loop stays stable,
+in one direction or in the direction with the lowest limit; whether the loop is passive; and the
+forces that the joints can hold. The interval of the limit is proved at the posture. Ctrl-C ends the
+sampling and prints the results so far.
 )";
 
 }  // namespace
@@ -142,7 +142,7 @@ void add_contact(CLI::App& program) {
       ->transform(control_period())
       ->option_text("S (1 ms)");
   command->add_option("--direction", options->direction, "Of the touch, in the base's axes")
-      ->option_text("x|y|z|a,b,c (bears least)")
+      ->option_text("x|y|z|a,b,c (lowest limit)")
       ->check(not_empty());
   command->add_option("--damper", options->options.damping, "Of what is touched")
       ->transform(quantity("N s/m", 0, kMost, "a damping of at least 0, in N s/m,"))
@@ -150,7 +150,9 @@ void add_contact(CLI::App& program) {
   command->add_option("--mass", options->options.mass, "Of what is touched")
       ->transform(quantity("kg", 0, kMost, "a mass of at least 0, in kg,"))
       ->option_text("M (0)");
-  command->add_option("--touch", options->asked, "Stiffness that it is to bear: says whether")
+  command
+      ->add_option("--touch", options->asked,
+                   "Stiffness to touch: says whether the loop stays stable")
       ->transform(quantity("N/m", 0, 1e12, "a stiffness from 0 to 1e12, in N/m,"))
       ->option_text("K");
   command->add_option("--plot", options->plot, "Draw ratio and frequency over the stiffness there")

@@ -21,7 +21,7 @@ std::string stiffness_text(double k, int digits = 4) {
   return std::isinf(k) ? "above 1e9" : format_number(k, digits);
 }
 
-/// Entries that are rounding errors are shown as zeros.
+/// Rounding errors are shown as zeros.
 std::string direction_text(const Eigen::Vector3d& n) {
   return "(" + format_list(n.unaryExpr([](double x) { return std::abs(x) < 1e-9 ? 0 : x; }), 2) +
          ")";
@@ -55,12 +55,12 @@ bool bears(const ContactReport& report) {
   return report.asked < (std::isnan(limit.lower) ? limit.stiffness : limit.lower);
 }
 
-/// How many postures of the workspace have no limit although the arm can hold itself there.
+/// Number of postures of the workspace that have no limit although the arm can hold itself there.
 std::size_t without_limit(const ContactReport& report) {
   return report.workspace.size() - not_held(report) - ranking(report.workspace).size();
 }
 
-/// How many postures of the workspace bear less than what was asked for.
+/// Number of postures of the workspace that are unstable at the stiffness asked for.
 std::size_t bearing_less(const ContactReport& report) {
   return static_cast<std::size_t>(std::count_if(
       report.workspace.begin(), report.workspace.end(),
@@ -72,20 +72,21 @@ std::string verdict(const AuditTask& task, const ContactReport& report) {
   const bool known = !controller::unknown_rotors(task.model).any();
   std::string text;
   if (touch.limit.stiffness == 0) {
-    text = known ? "Unstable before it touches anything"
-                 : "Without rotors, which yours is not, the arm bears no touch";
+    text =
+        known ? "Unstable before it touches anything"
+              : "Unstable before it touches anything, as an arm without rotors, which yours is not";
   } else if (std::isinf(touch.limit.stiffness)) {
-    text = "Bears springs of any stiffness up to 1e9 N/m " +
+    text = "Stable in contact with springs of any stiffness up to 1e9 N/m " +
            (report.options.direction ? "along " + direction_text(touch.direction)
                                      : std::string("in any direction"));
   } else {
-    text = "Bears springs up to " + format_number(touch.limit.stiffness, 4) + " N/m along " +
-           direction_text(touch.direction) +
-           (report.options.direction ? "" : ", where it bears least");
+    text = "Stable in contact with springs up to " + format_number(touch.limit.stiffness, 4) +
+           " N/m along " + direction_text(touch.direction) +
+           (report.options.direction ? "" : ", the direction with the lowest limit");
   }
   if (touch.limit.stiffness > 0 && !known) text += ", as an arm without rotors";
   if (report.asked > 0) {
-    text += "; of the " + format_number(report.asked, 4) +
+    text += "; at the " + format_number(report.asked, 4) +
             " N/m asked for: " + (bears(report) ? "yes" : "no");
     if (!report.workspace.empty()) {
       text += " here, and no at " + std::to_string(bearing_less(report)) + " of " +
@@ -96,7 +97,8 @@ std::string verdict(const AuditTask& task, const ContactReport& report) {
 }
 
 std::string passivity_text(const analysis::PortPassivity& found) {
-  if (found.passive) return "  Passive: it bears whatever is passive itself.\n";
+  if (found.passive)
+    return "  Passive: stable in contact with everything that is passive itself.\n";
   std::string text = "  Not passive";
   if (found.missing_friction > 0) {
     text += " from " + format_number(found.from, 3) + " to " + format_number(found.to, 4) +
@@ -132,7 +134,7 @@ std::string touch_table(const AuditTask& task, const ContactReport& report) {
   text += " N/m.\n" + passivity_text(found.passivity) +
           assumes_text(loop_assumptions(task.options, &task.model));
   if (const std::string missing = controller::missing_rotors_text(task.model); !missing.empty()) {
-    text += "  Rotors unknown: " + missing + ". The limit is that of " +
+    text += "  Rotors unknown: " + missing + ". The limit is computed for " +
             controller::arm_without_rotors(task.model) + ".\n";
     if (!std::isnan(report.limit_with_rotors)) {
       text += "  With the published drives " +

@@ -13,11 +13,11 @@
 namespace dashpot::apps {
 
 /// Results at many postures in order, or at the first ones if the user stops it. Chunks are
-/// handed out in order, so that what is done when the threads end has no gap.
+/// handed out in order, so that the finished postures have no gap.
 template <class Found>
 class PostureWorkers {
  public:
-  /// `find` returns what is found at so many postures from a first one on, in several threads.
+  /// `find` returns the results at a number of postures from a first one on, in several threads.
   PostureWorkers(std::int64_t count,
                  std::function<std::vector<Found>(std::int64_t first, std::int64_t size)> find)
       : count_(count), find_(std::move(find)), found_(static_cast<std::size_t>(count)) {}

@@ -1,5 +1,5 @@
 #pragma once
-// The gains that public controllers have before a user changes them.
+// The default gains of public controllers.
 
 #include <array>
 #include <string_view>
@@ -7,7 +7,7 @@
 namespace dashpot::apps {
 
 /// Default gains of a Cartesian impedance controller whose documentation calls them critically
-/// damped: D = 2 sqrt(K), in the null space as well. There they act through the projector of the
+/// damped: D = 2 sqrt(K), in the null space as well, where they act through the projector of the
 /// pseudo-inverse.
 struct GainPreset {
   std::string_view name;

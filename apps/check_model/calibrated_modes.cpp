@@ -67,7 +67,7 @@ RobotDescription calibrated_robot(const Config& config, const ModelCheck& check)
   options.viscous_friction = determined(config, check, ArmFigure::kViscousFriction);
   options.coulomb_friction = determined(config, check, ArmFigure::kCoulombFriction);
   options.reflected_inertia = determined(config, check, ArmFigure::kReflectedInertia);
-  options.torque_loop_inertia_ratio.resize(0);  // which they have in them
+  options.torque_loop_inertia_ratio.resize(0);  // contained in the determined inertias
   if (check.gravity) options.gravity = *check.gravity;
   if (const auto payload = determined_payload(check)) {
     options.payload.mass = payload->mass;
@@ -80,7 +80,7 @@ CalibratedLoop calibrated_loop(const Config& config, const ModelCheck& check,
                                const JointVector& q) {
   const RobotDescription robot = calibrated_robot(config, check);
   controller::Settings settings = config.settings;
-  // A torque that is held for a period acts half a period late already.
+  // The zero-order hold delays the torque by half a period.
   const double ticks = check.delay.value / settings.period - 0.5;
   CalibratedLoop loop;
   int& delay = settings.analysis.sampled.delay;
@@ -98,7 +98,7 @@ CalibratedLoop calibrated_loop(const Config& config, const ModelCheck& check,
   std::erase_if(which, [&](Index i) { return !(check.covariance(i, i) > 0); });
   MatrixXd J(values.size(), static_cast<Index>(which.size()));
   for (std::size_t k = 0; k < which.size(); ++k) {
-    // As far as the parameter is known, but no farther than the modes are linear in it.
+    // The deviation of the parameter, but within the range where the modes are linear in it.
     const double step = std::min(1e-4, 0.1 * std::sqrt(check.covariance(which[k], which[k])));
     const VectorXd there = values_of(spectrum_of(moved(robot, which[k], step), settings, q).modes);
     J.col(static_cast<Index>(k)) = (there - values) / step;

@@ -6,14 +6,14 @@
 
 namespace dashpot::apps {
 
-/// Returns the robot of a configuration with all that a check determined of it: rotors, friction,
+/// Returns the robot of a configuration with all that a check determined: rotors, friction,
 /// payload, gravity.
 controller::RobotDescription calibrated_robot(const controller::Config& config,
                                               const identification::ModelCheck& check);
 
 /// Returns the sampled loop that the configuration's gains make with this robot at the posture `q`,
-/// with the determined delay where that is longer than the configuration's. With J, how the modes
-/// change with the parameters, by differences, and P, the parameters' covariance, theirs is J P J'.
+/// with the longer of the determined delay and the configuration's. The covariance of the modes is
+/// J P J', with J = d modes / d parameters, by differences, and P the covariance of the parameters.
 CalibratedLoop calibrated_loop(const controller::Config& config,
                                const identification::ModelCheck& check,
                                const controller::JointVector& q);

@@ -123,9 +123,8 @@ void add_command(CLI::App* command, bool calibrates) {
         ->option_text("SHARE")
         ->check(CLI::Range(0.0, 0.5));
     command
-        ->add_option(
-            "--payload", options->payload,
-            "Whether that of the configuration is known; rotors of the wrist then are, too")
+        ->add_option("--payload", options->payload,
+                     "Whether the configuration's payload is exact: then wrist rotors can be found")
         ->check(CLI::IsMember({"fitted", "known"}))
         ->option_text("fitted|known (fitted)");
   }

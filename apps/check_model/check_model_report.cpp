@@ -93,7 +93,7 @@ std::string delay_text(const Estimate& delay) {
          (delay.value < 0 ? ", that is, they were measured late\n" : "\n");
 }
 
-/// The count of determined parameters, and the motion that would determine each of the others.
+/// The number of determined parameters, and the motion that would determine each other one.
 std::string determined_text(const CheckModelReport& report) {
   const ModelCheck& check = report.check;
   std::string text = "The records determine " + std::to_string(check.rank) + " of " +
@@ -182,11 +182,11 @@ std::string check_model_table(const CheckModelReport& report) {
     const std::string list =
         format_number(g[0], 3) + ", " + format_number(g[1], 3) + ", " + format_number(g[2], 3);
     constexpr double kDegree = 180 / std::numbers::pi;
-    doubts += "  gravity: the torques are " +
-              std::string(check.gravity_fits ? "those" : "nearer to those") +
-              " of an arm with robot.gravity: [" + list + "], not as the model says (+- " +
+    doubts += "  gravity: the torques " +
+              std::string(check.gravity_fits ? "match" : "are closer to") +
+              " an arm with robot.gravity: [" + list + "], not the model (+- " +
               format_number(kDegree * check.gravity_deviation, 2) + " deg): " +
-              (check.gravity_fits ? "how does it hang?\n" : "is the model wrong otherwise?\n");
+              (check.gravity_fits ? "how is it mounted?\n" : "is the model wrong otherwise?\n");
   }
   for (const std::string& one : check.order) doubts += "  " + one + "\n";
   for (std::size_t i = 0; i < check.joints.size(); ++i) {

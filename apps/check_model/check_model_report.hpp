@@ -8,8 +8,7 @@
 
 namespace dashpot::apps {
 
-/// A mode of the loop with the arm as it was calibrated, and deviations that follow from those of
-/// the parameters.
+/// A mode of the loop with the calibrated arm. Its standard deviations follow from the parameters'.
 struct CalibratedMode {
   double natural_frequency = 0, natural_frequency_std = 0;  ///< rad/s
   double damping_ratio = 0, damping_ratio_std = 0;
@@ -18,7 +17,7 @@ struct CalibratedMode {
 /// The loop that the configuration's gains make with the calibrated arm.
 struct CalibratedLoop {
   int delay = 0;                      ///< ticks: the configuration's, or the determined one
-  bool delay_found = false;           ///< it is the determined one
+  bool delay_found = false;           ///< `delay` was determined
   bool stable = true;                 ///< no discrete eigenvalue reaches the unit circle
   std::vector<CalibratedMode> modes;  ///< by falling frequency
 };
@@ -35,7 +34,7 @@ struct CheckModelReport {
 };
 
 /// "12.345 +- 0.012": two digits of the deviation, and as many of the value; "?" if the records do
-/// not narrow the value down.
+/// not determine the value.
 std::string estimate_text(const identification::Estimate& one);
 
 std::string check_model_table(const CheckModelReport& report);

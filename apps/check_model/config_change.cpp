@@ -7,7 +7,7 @@
 namespace dashpot::apps {
 namespace {
 
-/// Where a flow collection or a quoted scalar that begins at `at` ends.
+/// The end of the flow collection or quoted scalar that begins at `at`.
 std::size_t end_of_bracket(const std::string& text, std::size_t at) {
   int depth = 0;
   char quote = 0;
@@ -33,7 +33,7 @@ std::size_t end_of_bracket(const std::string& text, std::size_t at) {
   throw std::invalid_argument("no end");
 }
 
-/// Where a value ends that begins at `at`.
+/// The end of the value that begins at `at`.
 std::size_t end_of_value(const std::string& text, std::size_t at, bool in_flow) {
   if (at >= text.size()) throw std::invalid_argument("no value");
   if (std::string_view("[{\"'").find(text[at]) != std::string_view::npos) {
@@ -108,7 +108,7 @@ bool equal(const YAML::Node& a, const YAML::Node& b) {
 
 void set(YAML::Node node, const ConfigChange& wanted, std::size_t depth = 0) {
   if (depth + 1 == wanted.path.size()) {
-    node.remove(wanted.path[depth]);  // or what an alias names would change as well
+    node.remove(wanted.path[depth]);  // otherwise the node that an alias names changes as well
     node[wanted.path[depth]] = YAML::Load(wanted.value);
   } else {
     set(node[wanted.path[depth]], wanted, depth + 1);
@@ -126,7 +126,7 @@ std::string changed_config(const std::string& text, const std::vector<ConfigChan
     std::string result = text;
     for (const ConfigChange& one : changes) change(result, one);
     if (equal(YAML::Load(result), document)) return result;
-  } catch (const std::exception&) {  // then as if it came out wrong
+  } catch (const std::exception&) {  // treated like a wrong result
   }
   kept = false;
   YAML::Emitter emitter;

@@ -11,8 +11,8 @@ struct ConfigChange {
 };
 
 /// Returns the text of a YAML mapping with some keys changed or added, and everything else,
-/// comments too, as it was. Where the text cannot be changed so (anchors, block sequences), it is
-/// written anew, without comments, and `kept` is false.
+/// including comments, as it was. If the text cannot be changed so (anchors, block sequences), it
+/// is written again without comments, and `kept` is false.
 std::string changed_config(const std::string& text, const std::vector<ConfigChange>& changes,
                            bool& kept);
 

@@ -7,8 +7,8 @@
 namespace dashpot::apps {
 
 /// Reads the statuses of a driver of an iiwa or a Panda from an LCM log: channels q1 ..., v1 ...
-/// and the measured torques tau1 ...; nothing if the file is no log, or has none. Throws InputError
-/// if their number of joints changes.
+/// and the measured torques tau1 ...; nothing if the file is not a log or has no statuses. Throws
+/// InputError if their number of joints changes.
 std::optional<MotionFile> read_driver_log(const std::string& path);
 
 }  // namespace dashpot::apps

@@ -48,8 +48,7 @@ int rank_of(const std::string& name) {
              : 0;
 }
 
-/// A column's name without what tells the joint, and the joint: by a joint's name, or else by the
-/// last number.
+/// The stem of a column's name, and the joint, by a joint's name or otherwise by the last number.
 struct Place {
   std::string stem;
   int number = -1;
@@ -88,7 +87,7 @@ class Columns {
     for (std::size_t i = 0; i < file_.channels.size(); ++i) {
       if (quantity_of(file_.channels[i]) != quantity) continue;
       const Place place = place_of(file_.channels[i].name, model_);
-      // A motion that was commanded is none that was measured.
+      // A commanded motion is not a measurement.
       if (quantity != Quantity::kTorque && rank_of(place.stem) > 0) continue;
       auto& group = groups[place.stem];
       if (group.empty()) order.push_back(place.stem);
@@ -196,7 +195,7 @@ void check_positions(const TorqueFile& file, const RobotModel& model) {
   }
 }
 
-/// Refuses columns without a value, and torques that say nothing.
+/// Refuses columns without a value, and torques that do not vary.
 void check_values(const TorqueFile& file) {
   for (const auto& [values, names] : {std::pair(&file.record.position, &file.positions),
                                       std::pair(&file.record.torque, &file.torques)}) {
@@ -210,7 +209,7 @@ void check_values(const TorqueFile& file) {
   }
 }
 
-/// Notes torques of more than three times what a joint gives.
+/// Notes torques of more than three times the torque limit of a joint.
 void note_torques(TorqueFile& file, const RobotModel& model) {
   for (Index j = 0; j < file.record.torque.rows(); ++j) {
     const double effort = model.joints()[static_cast<std::size_t>(j)].effort;
@@ -241,7 +240,7 @@ double rate_factor(const TorqueFile& file, const MatrixXd& velocity, Index j) {
   return square > 0 ? cross / square : 1;
 }
 
-/// Velocities are not used, but tell whether they and positions are in the units that are said.
+/// Velocities only serve to check the units that the file states for positions and velocities.
 void check_velocities(TorqueFile& file, const Columns& columns) {
   std::vector<std::string> unused;
   const auto found = columns.find(Quantity::kVelocity, unused);

@@ -16,12 +16,11 @@ struct TorqueFile {
 };
 
 /// Reads a CSV file or an LCM log (see read_motion_file, read_driver_log) of the motion of a
-/// model's joints. Columns are told by their units or names; they belong to the joints by the
-/// joints' names or by numbers. `positions` and `torques` name the columns, "a,b,...", in the
-/// model's order; empty: those that are found. `hints` are for files without a line of names or a
-/// column of time. Throws InputError that names the file, the column
-/// and the value, for columns that are not found, and for positions or velocities that must be in
-/// degrees.
+/// model's joints. Units or names identify the columns; joint names or numbers assign them to
+/// joints. `positions` and `torques` name the columns, "a,b,...", in the model's order; empty: the
+/// columns found. `hints` are for files without a line of names or a column of time. Throws
+/// InputError, with the file, the column and the value, for columns that are not found, and for
+/// positions or velocities that must be in degrees.
 TorqueFile read_torque_file(const std::string& path, const controller::RobotModel& model,
                             const std::string& positions, const std::string& torques,
                             const FileHints& hints = {});

@@ -20,7 +20,7 @@ using identification::Estimate;
 using identification::JointCheck;
 using identification::ModelCheck;
 
-/// Where a figure is: in a check, in a model, and in YAML.
+/// The place of a figure in a check, in a model, and in YAML.
 struct FigurePlace {
   Estimate JointCheck::*found;
   double Joint::*known;

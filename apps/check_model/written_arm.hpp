@@ -10,7 +10,7 @@ namespace dashpot::apps {
 /// A figure of each joint.
 enum class ArmFigure : std::uint8_t { kReflectedInertia, kViscousFriction, kCoulombFriction };
 
-/// Returns what the records determine of it, and the configuration's elsewhere; nothing below zero.
+/// Returns the determined figures, and the configuration's for other joints; nothing below zero.
 controller::JointVector determined(const controller::Config& config,
                                    const identification::ModelCheck& check, ArmFigure figure);
 
@@ -18,7 +18,7 @@ controller::JointVector determined(const controller::Config& config,
 std::optional<controller::Payload> determined_payload(const identification::ModelCheck& check);
 
 /// Writes the configuration in the file `from` to the file `to` with what was determined, and notes
-/// what was not kept. Throws InputError where the records say that something else is wrong.
+/// what was not kept. Throws InputError if the records show that something else is wrong.
 void write_config(const std::string& from, const std::string& to, const controller::Config& config,
                   CheckModelReport& report);
 

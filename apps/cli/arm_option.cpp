@@ -16,15 +16,15 @@ namespace {
 using controller::RobotModel;
 using text::Units;
 
-/// One for each unit, or nothing if there is no text.
+/// One quantity for each unit; nothing if there is no text.
 std::optional<Eigen::VectorXd> quantities(const std::string& option, const std::string& text,
                                           const Units& units) {
   if (text.empty()) return std::nullopt;
   return parse_quantities(option, text, units);
 }
 
-/// As quantities_per_joint, in the units of revolute and prismatic joints; nothing if there is no
-/// text.
+/// Like quantities_per_joint, in the units of revolute and prismatic joints; nothing if there is
+/// no text.
 std::optional<Eigen::VectorXd> per_joint(const std::string& option, const std::string& text,
                                          const RobotModel& model, const char* revolute,
                                          const char* prismatic) {
@@ -183,14 +183,14 @@ void add_loop_options(CLI::App& command, controller::LoopTiming& timing) {
                    : "a whole number of ticks from 0 to 100 is wanted, not '" + text + "'";
       })
       ->option_text("N (0)");
-  command.add_option("--cutoff", timing.cutoff, "Of a low-pass on the torque; 0: none")
+  command.add_option("--cutoff", timing.cutoff, "Cutoff of a low-pass on the torque; 0: none")
       ->transform(quantity("Hz", 0, std::numeric_limits<double>::max(), "a frequency in Hz"))
       ->option_text("HZ (0)");
   command.add_flag("--difference-velocity", timing.difference_velocity,
                    "The controller takes velocities from positions");
   command
       .add_option("--integral-time", timing.integral_time,
-                  "Of the integral of the springs; 0: none")
+                  "Time of the integral of the springs; 0: none")
       ->transform(quantity("s", 0, std::numeric_limits<double>::max(), "a time in s"))
       ->option_text("S (0)");
   command.add_flag("--ideal-gravity", timing.ideal_gravity,

@@ -18,7 +18,7 @@ struct ArmOptions {
   std::string joint_stiffness;  ///< of springs in the joints instead, n or one; N m/rad
   std::string task_stiffness;   ///< diagonal of K_C, 6: linear, then angular; N/m, N m/rad
   std::string task_damping;     ///< diagonal of C_C before, 6; none if empty
-  // What is there besides, none where empty; n numbers, or one for all joints
+  // Further properties, none if empty; n numbers, or one for all joints
   std::string viscous_friction;   ///< N m s/rad, or "urdf" or "drives" for what these have
   std::string null_damping;       ///< of the motions that the task leaves free, N m s/rad
   std::string reflected_inertia;  ///< kg m^2
@@ -28,33 +28,32 @@ struct ArmOptions {
   /// xx,yy,zz[,xy,xz,yz]; kg, m, kg m^2.
   std::string payload;
 
-  std::string accept_inertias;  ///< though no body can have them, see take_accepted
+  std::string accept_inertias;  ///< although impossible for a body, see take_accepted
 
-  bool any() const;  ///< whether any option but `urdf` is there
+  bool any() const;  ///< whether any option except `urdf` is given
 };
 
 /// Adds --payload to a command.
 void add_payload(CLI::App& command, std::string& payload);
-/// Reads what is said in it. Throws InputError.
+/// Reads a payload. Throws InputError.
 controller::Payload read_payload(const std::string& text);
 
 /// The arm with its payload, reflected inertia, and the friction that counts. Throws InputError.
 controller::RobotModel read_model(const ArmOptions& options);
 
-/// Returns what counts of friction, or is left out, in a sentence; empty if there is none.
+/// Returns a sentence on the friction that counts or is left out; empty if there is none.
 std::string friction_note(const ArmOptions& options, const controller::RobotModel& model);
 
 /// The arm with its springs at q, as a file would give it: mass, jacobian (6 x n, base-aligned axes
-/// at the tip), task_stiffness, task_damping, and damping with what friction and null space add; or
-/// stiffness alone for springs in the joints.
-/// Throws InputError.
+/// at the tip), task_stiffness, task_damping, and the damping by friction and in the null space; or
+/// stiffness alone for springs in the joints. Throws InputError.
 SystemEntry read_arm(const ArmOptions& options, const controller::RobotModel& model,
                      const controller::JointVector& q);
 
 /// Adds the options of the arm's inertia and friction: reflected inertia, payload and so on.
 void add_model_options(CLI::App& command, ArmOptions& arm);
 
-/// Adds the options of a loop but for its period. `given` tells whether one of them was.
+/// Adds the options of a loop except its period.
 void add_loop_options(CLI::App& command, controller::LoopTiming& timing);
 bool given(const controller::LoopTiming& timing);
 

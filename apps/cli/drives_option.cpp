@@ -22,7 +22,7 @@ void take_drives(const std::string& name, controller::ModelOptions& model) try {
 void add_accept_inertias(CLI::App& command, std::string& accepted) {
   command
       .add_flag("--accept-inertias", accepted,
-                "Take inertias that no body can have as they are: all, or those of these links")
+                "Take impossible inertias as they are: of all links, or of these links only")
       ->option_text("[=LINK,...]");
 }
 
@@ -56,13 +56,13 @@ void warn_of(const controller::Config& config) {
 void add_gear_options(CLI::App& command, GearOptions& options) {
   command
       .add_option("--gear-stiffness", options.stiffness,
-                  "Of gears that bend, N m/rad; none: rigid. Needs reflected inertia")
+                  "Of elastic joints, N m/rad; none: rigid. Needs reflected inertia")
       ->option_text("a,b,...|x (none)");
-  command.add_option("--gear-damping", options.damping, "Of these gears, N m s/rad")
+  command.add_option("--gear-damping", options.damping, "Of elastic joints, N m s/rad")
       ->option_text("a,b,...|x (0)");
   command
       .add_option("--position-sensor", options.position_sensor,
-                  "On which side of them joint positions are measured")
+                  "Side of the gears where joint positions are measured")
       ->check(CLI::IsMember({"motor", "link"}))
       ->option_text("motor|link (motor)");
 }

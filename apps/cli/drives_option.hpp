@@ -13,24 +13,24 @@ inline constexpr const char* kDrivesHelp =
     "...; "
     "or a file of dashpot calibrate";
 
-/// Has the model take the published drives of this name, or those of a file, unless it is empty.
+/// Gives the model the published drives, or the drives file, of this name unless it is empty.
 /// Throws InputError with the option --drives.
 void take_drives(const std::string& name, controller::ModelOptions& model);
 
-/// Adds the flag --accept-inertias to a command; `accepted` becomes "true", or what is said as in
-/// --accept-inertias=hand,finger.
+/// Adds the flag --accept-inertias to a command; `accepted` becomes "true", or the links given as
+/// in --accept-inertias=hand,finger.
 void add_accept_inertias(CLI::App& command, std::string& accepted);
-/// Has the model accept these inertias.
+/// Makes the model accept these inertias.
 void take_accepted(const std::string& accepted, controller::ModelOptions& model);
 
-/// Tells people at the terminal what is doubtful about the description of the arm.
+/// Prints doubts about the description of the arm on a terminal.
 void warn_of(const controller::RobotModel& model);
-/// Tells people at the terminal what is doubtful about gains.
+/// Prints doubts about gains on a terminal.
 void warn_of(const controller::RobotModel& model, const controller::Gains& gains);
-/// Tells people at the terminal what is doubtful about the arm and gains of a configuration.
+/// Prints doubts about the arm and gains of a configuration on a terminal.
 void warn_of(const controller::Config& config);
 
-/// What is told of gears that bend; lists of quantities between commas, or one for all joints.
+/// Elastic gears; lists of quantities between commas, or one for all joints.
 struct GearOptions {
   std::string stiffness;        ///< N m/rad; "none": rigid
   std::string damping;          ///< N m s/rad
@@ -42,14 +42,14 @@ struct GearOptions {
 /// Adds --gear-stiffness, --gear-damping and --position-sensor.
 void add_gear_options(CLI::App& command, GearOptions& options);
 
-/// Has `model` take the gears of an arm with the joints of `plain`. Throws InputError.
+/// Gives `model` the gears of an arm with the joints of `plain`. Throws InputError.
 void take_gears(const GearOptions& options, const controller::RobotModel& plain,
                 controller::ModelOptions& model);
 
 /// Refuses the name "".
 CLI::Validator not_empty();
 
-/// Returns what is wrong with a model, with the options of the command line.
+/// Returns the error of a model in terms of the command-line options.
 controller::InputError model_error(const controller::InvalidModel& error);
 
 }  // namespace dashpot::apps

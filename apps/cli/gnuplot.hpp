@@ -6,8 +6,8 @@ namespace dashpot::apps {
 /// Returns text between single quotes for gnuplot.
 std::string quoted_for_gnuplot(const std::string& text);
 
-/// Throws InputError unless the path that the user gave with `--plot` ends with .svg or .png,
-/// in a folder that is there.
+/// Throws InputError unless the path that the user gave with `--plot` ends with .svg or .png and
+/// its folder exists.
 void check_plot_name(const std::string& path);
 
 /// The first lines of a gnuplot script that draws to `path`, `width` x `height` pixels.

@@ -24,7 +24,7 @@ std::vector<std::string> split(const std::string& text) {
   return words;
 }
 
-/// Refuses a list of another length than `expected` says.
+/// Refuses a list whose length is not `expected`.
 [[noreturn]] void refuse_length(const std::string& option, const std::vector<std::string>& words,
                                 const std::string& expected) {
   const std::string& only = words.front();
@@ -89,7 +89,7 @@ CLI::Validator quantity(const std::string& unit, double least, double most,
       const double value = text::parse_quantity(text, unit);
       if (value >= least && value <= most) return std::optional(value);
     } catch (const std::invalid_argument&) {
-    }  // said below, too
+    }  // reported below
     return std::optional<double>();
   };
   const auto convert = [=](std::string& text) -> std::string {
@@ -108,7 +108,7 @@ CLI::Validator quantity(const std::string& unit, double least, double most,
 }
 
 CLI::Validator damping_ratio() {
-  constexpr double kLargest = 1e9, kUnlikely = 5;  // of which a hundredth may be meant
+  constexpr double kLargest = 1e9, kUnlikely = 5;  // may be a percentage
   CLI::Validator ratio =
       quantity("", std::numeric_limits<double>::min(), kLargest, "a positive ratio up to 1e9");
   return CLI::Validator(
@@ -118,7 +118,8 @@ CLI::Validator damping_ratio() {
         if (value >= kUnlikely) {
           std::ostringstream warning;
           warning << "warning: a damping ratio of " << value
-                  << " is wanted; it is no percentage: " << value << " % would be " << value / 100;
+                  << " is wanted; a ratio is not a percentage: " << value << " % would be "
+                  << value / 100;
           print_error(warning.str());
         }
         return refusal;

@@ -7,24 +7,23 @@
 
 namespace dashpot::apps {
 
-/// Quantities between commas, "1,-30 deg,0", in SI: one for each of `units`, which is that of a
-/// number without its own (see text::parse_quantity). Throws controller::InputError with
-/// `option` as key.
+/// Quantities between commas, "1,-30 deg,0", in SI: one for each of `units`, the unit of a number
+/// without a unit (see text::parse_quantity). Throws controller::InputError with `option` as key.
 Eigen::VectorXd parse_quantities(const std::string& option, const std::string& text,
                                  const text::Units& units);
 
-/// The same, none negative; a single one is that of all joints. Unless `none` is NaN, the word none
-/// stands for it.
+/// The same, none negative; a single quantity applies to all joints. The word none stands for
+/// `none` unless that is NaN.
 Eigen::VectorXd quantities_per_joint(const std::string& option, const std::string& text,
                                      const text::Units& units, double none = text::kNoNone);
 
 /// Checks that an option is a quantity from `least` to `most`, in the SI unit `unit`, and turns it
-/// into a number without unit, as CLI::Option::transform asks for; `what` says what is wanted. A
-/// refusal names the smaller unit with which a number that has none would fit.
+/// into a number without unit, as CLI::Option::transform asks for; `what` describes it. A
+/// refusal names the smaller unit with which a number without a unit would fit.
 CLI::Validator quantity(const std::string& unit, double least, double most,
                         const std::string& what);
 
-/// Accepts a damping ratio that is wanted, up to 1e9, with a warning where a percentage is likely.
+/// Accepts a damping ratio up to 1e9, with a warning if it is likely to be a percentage.
 CLI::Validator damping_ratio();
 
 /// Accepts any positive quantity.

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using controller::InputError;
 
-/// Where a file is made that is not there yet: the end of all links.
+/// The path at which a new file is made: the end of all links.
 fs::path resolved(fs::path path) {
   constexpr int kMostLinks = 40;  // Linux follows as many
   std::error_code none;
@@ -31,7 +31,7 @@ bool same_file(const NamedFile& one, const NamedFile& other) {
   const fs::path a = one.path;
   const fs::path b = other.path == "-" ? "/dev/stdin" : other.path;
   std::error_code none;
-  if (a == b) return true;  // a device too: two writers would mix there
+  if (a == b) return true;  // even for a device, where two writers would mix
   if (!fs::exists(a, none) && !fs::exists(b, none)) return resolved(a) == resolved(b);
   return fs::is_regular_file(a, none) && fs::equivalent(a, b, none);
 }

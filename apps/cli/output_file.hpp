@@ -7,18 +7,18 @@
 
 namespace dashpot::apps {
 
-/// A file to write, which the user has named with an option, or none.
+/// A file to write that the user has named with an option, or no file.
 class OutputFile {
  public:
   OutputFile() = default;
-  /// Opens `path`, or none if it is empty. Throws InputError that names `option` and the path.
+  /// Opens `path` unless it is empty. Throws InputError that names `option` and the path.
   OutputFile(const std::string& option, const std::string& path);
 
   explicit operator bool() const noexcept { return file_ != nullptr; }
   /// Writes text. Throws std::runtime_error that names option, path and reason, such as a full
   /// disk.
   void write(std::string_view text);
-  /// Has the system take all that was written. Throws likewise.
+  /// Passes all that was written to the system. Throws likewise.
   void flush();
   /// Flushes and closes, if a file is open. Throws likewise.
   void finish();
@@ -42,7 +42,7 @@ struct NamedFile {
 void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs);
 
 /// Adds the records of one experiment to the inputs. Throws InputError, with both names, if one is
-/// a copy of another: what counts twice makes deviations too narrow.
+/// a copy of another: a record that counts twice makes deviations too narrow.
 void add_records(const std::vector<std::string>& files, std::vector<NamedFile>& inputs);
 
 }  // namespace dashpot::apps

@@ -9,11 +9,11 @@
 
 namespace dashpot::apps {
 
-/// What the user says of a posture.
+/// The options of a posture.
 struct PostureOption {
   std::string q;                ///< empty: controller::default_posture
-  bool outside_limits = false;  ///< take what is outside the position limits, with a warning
-  double refused = 1e-3;        ///< rad or m outside them, from where on it is refused otherwise
+  bool outside_limits = false;  ///< accept a posture outside the position limits, with a warning
+  double refused = 1e-3;        ///< rad or m outside the limits from which on it is refused
   bool has_to_hold = false;     ///< refuse a posture that the arm cannot hold, or warn
 
   /// Adds --q and --outside-limits.
@@ -26,7 +26,7 @@ struct PostureOption {
              const controller::JointVector& posture) const;
 };
 
-/// What the user says of many postures: one of three ways, or nothing.
+/// The options of many postures: one of three ways, or none.
 struct PosturesOption {
   std::string file;        ///< of --postures
   std::string log;         ///< an LCM log

@@ -5,8 +5,8 @@
 #include <string>
 
 // One function for each subcommand: adds it, with its options, to the program. The subcommand runs
-// when the command line is parsed. It throws InputError for bad input (exit status 2) and any other
-// exception for what is not the user's fault (exit status 1), and prints only when all went well.
+// when the command line is parsed. It throws InputError for bad input (exit status 2) and another
+// exception for any other failure (exit status 1), and prints only if all went well.
 
 namespace dashpot::apps {
 
@@ -16,7 +16,7 @@ inline constexpr const char* kExitStatusHelp =
     "ended\n"
     "it early, 1 if anything else failed, or a loop ended with a latched fault.";
 
-/// For that of subcommands that take physical quantities.
+/// For the help text of subcommands that take physical quantities.
 inline constexpr const char* kUnitsHelp =
     "Numbers are in SI units; a number with another unit is converted: '30 deg', 1ms, 20Nm/rad.\n";
 
@@ -38,12 +38,12 @@ void add_command(CLI::App& program);
 void add_drive(CLI::App& program);
 void add_fake_driver(CLI::App& program);
 
-/// Writes all of `text` to standard output, what could steer a terminal as escapes (files and
-/// messages hold names that others chose). Throws std::runtime_error if that fails.
+/// Writes all of `text` to standard output, with control characters as escapes (files and messages
+/// hold names that others chose). Throws std::runtime_error if that fails.
 void print(const std::string& text);
 
-/// Prints text with escape sequences of our own: nothing in `text` may come from elsewhere unless
-/// text::printable() was applied to it.
+/// Prints text with the program's own escape sequences: text::printable() must have been applied to
+/// all of `text` that comes from elsewhere.
 void print_styled(const std::string& text);
 
 /// Writes one line to standard error, printable whatever is in `message`.

@@ -67,7 +67,7 @@ std::optional<Eigen::VectorXd> per_joint(const YamlMapping& keys, std::string_vi
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-/// sum += more, which is right within more_error; what is not known of the sum goes to `error`.
+/// sum += more, which is right within more_error; the uncertainty of the sum is added to `error`.
 void add(const Eigen::MatrixXd& more, const Eigen::MatrixXd& more_error, Eigen::MatrixXd& sum,
          Eigen::MatrixXd& error) {
   sum += more;
@@ -75,7 +75,7 @@ void add(const Eigen::MatrixXd& more, const Eigen::MatrixXd& more_error, Eigen::
   error += more_error + kEpsilon * sum.cwiseAbs();
 }
 
-/// Gears that bend between the motors and the links of the joints.
+/// Elastic gears between the motors and the links of the joints.
 void read_gears(const YamlMapping& keys, SystemEntry& entry) {
   const Eigen::Index n = entry.impedance.mass.rows();
   std::vector<std::string> units(static_cast<std::size_t>(n));
@@ -100,8 +100,8 @@ void read_gears(const YamlMapping& keys, SystemEntry& entry) {
   }
 }
 
-/// What is there besides the matrices given: inertia of drives and of a point mass at the origin of
-/// the task, and damping in the null space.
+/// Additions to the given matrices: inertia of drives and of a point mass at the origin of the
+/// task, and damping in the null space.
 void read_additions(const YamlMapping& keys, SystemEntry& entry) {
   analysis::TaskImpedance& impedance = entry.impedance;
   const Eigen::Index n = impedance.mass.rows();
@@ -189,7 +189,7 @@ analysis::System<> SystemEntry::system(const analysis::TaskImpedance& given) con
 const char* const kSystemFileHelp =
     R"(FILE is YAML or JSON: one system, or a list of systems. "-" reads standard input.
 n joints, m task directions; SI units; matrices are lists of rows.
-Tables and messages count the systems of a list from 0: [0].mass is that of the first.
+Tables and messages count the systems of a list from 0: [0].mass belongs to the first.
   mass              n x n, symmetric positive definite
   stiffness         n x n, symmetric                           } one of the two,
   task_stiffness    m x m, symmetric, with jacobian (m x n)    } or both: they add up
@@ -200,7 +200,7 @@ Tables and messages count the systems of a list from 0: [0].mass is that of the 
                     n matrices m x n, dJ/dq_k, and the wrench (m) of the task spring at
                     equilibrium: adds the geometric stiffness [(dJ/dq_1)' f ...]
   reflected_inertia n, of drives, added to the diagonal of mass
-  gear_stiffness    n, of gears that bend between motors with that inertia and their links; none:
+  gear_stiffness    n, of elastic gears between motors with that inertia and their links; none:
                     rigid; with gear_damping (n) and position_sensor (motor or link)
   payload           a mass, kg, at the origin of a task of six directions, added to mass
   null_damping      n, damping of the motions that task_stiffness leaves free, as a

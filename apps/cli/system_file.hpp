@@ -18,7 +18,7 @@ using controller::InputError;
 /// One system as the user wrote it (SI units; n joints, m task directions). The vectors below have
 /// n entries; analysis::to_joint_space checks the matrices.
 struct SystemEntry {
-  analysis::TaskImpedance impedance;  ///< with all that the keys add
+  analysis::TaskImpedance impedance;  ///< with the additions of all keys
   /// The robot's part of a sampled loop: friction, which the damping contains, gears, and, of an
   /// arm, the gravity that is compensated.
   analysis::SampledLoop loop;
@@ -31,8 +31,8 @@ struct SystemEntry {
   std::string prefix;                ///< of the keys in messages: "" or "[2]."
   std::map<std::string, int> lines;  ///< of the keys given
 
-  /// Adds N' D N, the damping D (n x n) of what task_stiffness leaves free, to the damping. Does
-  /// nothing where mass or task do not allow it, which analysis::to_joint_space then says.
+  /// Adds N' D N, the damping D (n x n) of the motions that task_stiffness leaves free. Does
+  /// nothing if mass or task do not allow it; analysis::to_joint_space then reports that.
   void add_null_damping(const Eigen::MatrixXd& D);
 
   /// Returns the system that an impedance, `impedance` or one with another damping, makes with the

@@ -36,7 +36,7 @@ void end_now(int /*signal*/) {
   _exit(written < 0 ? 1 : 130);
 }
 
-/// Has the signals that end a program from outside handled so.
+/// Installs a handler of the signals that end a program from outside.
 void handle_ends(void (*handler)(int)) {
   struct sigaction action {};
   action.sa_handler = handler;
@@ -80,7 +80,7 @@ bool on_terminal() {
 }
 
 void show_progress(double done, const std::string& note) {
-  constexpr auto kQuick = std::chrono::seconds(1);  // a task that needs no sign of life
+  constexpr auto kQuick = std::chrono::seconds(1);  // shorter tasks show no progress
   constexpr auto kRedraw = std::chrono::milliseconds(100);
   constexpr std::size_t kWidth = 40;
   if (!(done < 1)) return clear_progress();

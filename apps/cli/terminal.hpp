@@ -4,8 +4,8 @@
 
 namespace dashpot::apps {
 
-/// From its construction on, the first SIGINT (Ctrl-C), SIGTERM or SIGHUP does not end the program
-/// but is noted.
+/// From its construction on, the first SIGINT (Ctrl-C), SIGTERM or SIGHUP is noted instead of
+/// ending the program.
 class StopSignal {
  public:
   StopSignal();
@@ -13,8 +13,7 @@ class StopSignal {
 };
 
 /// While it exists, the same signals end the program at once, with "dashpot WHAT: interrupted" on
-/// standard error and exit status 130: for a task that has nothing to show before its end. One at a
-/// time.
+/// standard error and exit status 130: for a task without results before its end. One at a time.
 class EndOnSignal {
  public:
   explicit EndOnSignal(const std::string& what);
@@ -23,7 +22,7 @@ class EndOnSignal {
   EndOnSignal& operator=(const EndOnSignal&) = delete;
 };
 
-/// Ends the program with exit status 130, as shells tell of Ctrl-C, after what there is was
+/// Ends the program with exit status 130, as shells report Ctrl-C, after the results so far were
 /// printed. The message says how much was done.
 class Interrupted : public std::runtime_error {
  public:
@@ -34,15 +33,15 @@ class Interrupted : public std::runtime_error {
 bool on_terminal();
 
 /// Shows on the last line of a terminal how much of a task is done, from 0 to 1, and `note` behind
-/// it: now and then, once the task takes longer than a second. Does nothing where standard error is
-/// no terminal. One thread at a time.
+/// it: now and then, once the task takes longer than a second. Does nothing if standard error is
+/// not a terminal. One thread at a time.
 void show_progress(double done, const std::string& note = "");
-/// Clears that line; the next one belongs to another task. show_progress(1) and whatever is printed
-/// do so as well.
+/// Clears that line; the next one belongs to another task. show_progress(1) and all printing clear
+/// it as well.
 void clear_progress();
 
 /// Calls `call` with each of `items`, showing how many are done, until Ctrl-C, which takes effect
-/// from the second one on. Returns "" if all are done, otherwise "3 of 9 WHAT are done".
+/// from the second item on. Returns "" if all are done, otherwise "3 of 9 WHAT are done".
 template <class Items, class Call>
 std::string for_each_shown(const Items& items, const Call& call, const std::string& what) {
   if (items.size() < 2) {
@@ -62,8 +61,8 @@ std::string for_each_shown(const Items& items, const Call& call, const std::stri
   return "";
 }
 
-/// The whole terminal for a text that is drawn again and again in its place; what was there before
-/// comes back at the end.
+/// The whole terminal for a text that is drawn repeatedly in its place; the previous contents come
+/// back at the end.
 class FullScreen {
  public:
   FullScreen();
@@ -71,7 +70,7 @@ class FullScreen {
   FullScreen(const FullScreen&) = delete;
   FullScreen& operator=(const FullScreen&) = delete;
 
-  /// As much of `text` as fits. What comes from elsewhere in it must be printable.
+  /// Draws as much of `text` as fits. Parts that come from elsewhere must be printable.
   void draw(const std::string& text);
 };
 

@@ -1,4 +1,4 @@
-// `dashpot command`: one command to a loop that runs, and what the loop answers.
+// `dashpot command`: one command to a running loop, and the answer of the loop.
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/controller/settings_check.hpp>
@@ -36,7 +36,7 @@ struct CommandOptions {
   bool release = false, anyway = false;
 };
 
-/// Fills an array or vector of the message's.
+/// Fills an array or vector of the message.
 template <class Values>
 void take(const std::string& option, const std::string& text, const text::Units& units,
           Values& values) {
@@ -44,7 +44,7 @@ void take(const std::string& option, const std::string& text, const text::Units&
   for (Eigen::Index i = 0; i < given.size(); ++i) values[static_cast<std::size_t>(i)] = given[i];
 }
 
-/// Fills the diagonal of a matrix of the message's.
+/// Fills the diagonal of a matrix of the message.
 template <class Rows>
 void take_diagonal(const std::string& option, const std::string& text, const text::Units& units,
                    Rows& rows) {
@@ -134,7 +134,7 @@ command_t make_command(const CommandOptions& options, const state_t& state) {
     take("--joint-position", options.joint_position, text::Units(n, "rad"), command.joint_position);
   }
   if (pose) {
-    command.parts |= command_t::TIP_POSE;  // what is not given stays where the springs are fixed
+    command.parts |= command_t::TIP_POSE;  // omitted parts stay where the springs are fixed
     std::copy_n(state.reference_tip_position, 3, command.tip_position);
     std::copy_n(state.reference_tip_quaternion, 4, command.tip_quaternion);
     if (!options.tip_position.empty()) {
@@ -167,7 +167,7 @@ command_t make_command(const CommandOptions& options, const state_t& state) {
   return command;
 }
 
-/// Refuses what is wrong whatever the loop is. Throws InputError.
+/// Refuses options that are wrong for any loop. Throws InputError.
 void check(const CommandOptions& options) {
   state_t any{};
   any.fault_tick = 1;
@@ -187,7 +187,7 @@ double turn(const double (&from)[4], const Eigen::Quaterniond& to) {
   return begin.normalized().angularDistance(to.normalized());
 }
 
-/// A command as a loop with the usual limits judges it, which knows no positions of joints.
+/// The judgement of a loop with the default limits but without limits of joint positions.
 lcmtypes::CommandFilter judged(const command_t& command) {
   lcmtypes::CommandLimits usual;
   usual.position_upper.setConstant(command.n, std::numeric_limits<double>::infinity());
@@ -199,15 +199,14 @@ lcmtypes::CommandFilter judged(const command_t& command) {
   return filter;
 }
 
-/// Refuses what is likely to be meant otherwise, as far as the loop's state tells. Throws
-/// InputError.
+/// Refuses a command that is likely to be a mistake in view of the loop's state. Throws InputError.
 void doubt(const command_t& command, const state_t& state) {
   constexpr const char* kAnyway = "; --anyway sends it";
   const double reach = Eigen::Map<const Eigen::Vector3d>(state.tip_position).norm();
   const controller::Gains gains = judged(command).command().setpoint.gains;
   const std::string soft = controller::soft_stiffness(gains);
   for (const std::string& said : controller::doubtful_gains(std::max(1.0, reach), gains)) {
-    // To soften is the safe direction, and perhaps urgent.
+    // Softer springs are safe, and perhaps urgent.
     if (said != soft) throw InputError("", said + kAnyway);
     print_error("warning: " + said);
   }
@@ -224,7 +223,7 @@ void doubt(const command_t& command, const state_t& state) {
   throw InputError("--tip-quaternion", text.str());
 }
 
-/// Why the loop refused a command: its verdict, and what the usual limits say of the numbers.
+/// The reason for a refusal: the loop's verdict, and the judgement by the default limits.
 std::string refusal(const command_t& command, lcmtypes::CommandVerdict verdict) {
   const lcmtypes::CommandFilter usual = judged(command);
   if (usual.tally().last_refusal == verdict) return usual.last_reason();
@@ -282,22 +281,22 @@ void send(const CommandOptions& options) {
     bus->publish(lcmtypes::kCommandChannel, &command);
   };
   publish();
-  // Only a sender whose command was accepted commands the arm: counters tell of others' commands.
+  // Only the sender of an accepted command commands the arm: counters include others' commands.
   const auto commands = [&] { return state->commander == command.sender; };
   const auto refused = [&] { return state->last_refused_sender == command.sender; };
   if (!until(options.timeout, [&] { return refused() || commands(); })) {
-    command.parts = command_t::GIVE_UP;  // where the answer is late, nobody is to command the arm
+    command.parts = command_t::GIVE_UP;  // a late answer must not leave the arm commanded
     publish();
     throw std::runtime_error(
         "no answer; does the loop take commands (dashpot run --commands)? If it does, "
-        "what it was told may still act");
+        "the command may still act");
   }
   if (!commands()) {
     throw std::runtime_error(
         "refused: " + refusal(command, static_cast<lcmtypes::CommandVerdict>(state->last_refusal)));
   }
-  // The next sender may be another call of this program. A message may be lost; the loop's silence
-  // ends the command of this sender then.
+  // The next sender may be another call of this program. If this message is lost, the loop's
+  // time limit on silence ends the command of this sender.
   command.parts = command_t::GIVE_UP;
   for (int i = 0; i < 10 && commands(); ++i) {
     publish();
@@ -321,32 +320,37 @@ void add_command(CLI::App& program) {
       "Goal of the joints, or the posture in mode cartesian, rad or m", "a,b,...");
   add("--tip-position", &CommandOptions::tip_position, "Goal of the tip, m", "x,y,z");
   add("--tip-quaternion", &CommandOptions::tip_quaternion, "Its orientation", "w,x,y,z");
-  add("--wrench", &CommandOptions::wrench, "That the tip exerts as well, N and N m",
+  add("--wrench", &CommandOptions::wrench, "Additional wrench of the tip, N and N m",
       "x,y,z,rx,ry,rz");
   add("--stiffness,--task-stiffness", &CommandOptions::stiffness, "Diagonal, N/m and N m/rad",
       "x,y,z,rx,ry,rz");
   add("--damping,--task-damping", &CommandOptions::damping, "Diagonal, N s/m and N m s/rad",
       "x,y,z,rx,ry,rz");
-  command->add_option("--damping-ratio", options->damping_ratio, "Of every mode of the task")
+  command
+      ->add_option("--damping-ratio", options->damping_ratio,
+                   "Damping ratio of every mode of the task")
       ->transform(damping_ratio())
       ->option_text("Z");
-  add("--joint-stiffness", &CommandOptions::joint_stiffness, "Of the joints, N m/rad", "a,b,...|x");
-  add("--joint-damping", &CommandOptions::joint_damping, "Of the joints, N m s/rad", "a,b,...|x");
+  add("--joint-stiffness", &CommandOptions::joint_stiffness, "Stiffness of the joints, N m/rad",
+      "a,b,...|x");
+  add("--joint-damping", &CommandOptions::joint_damping, "Damping of the joints, N m s/rad",
+      "a,b,...|x");
   command
       ->add_option("--joint-damping-ratio", options->joint_damping_ratio,
-                   "Of every mode of the joints' springs")
+                   "Damping ratio of every mode of the joint springs")
       ->transform(damping_ratio())
       ->option_text("Z");
   add("--null-stiffness", &CommandOptions::null_stiffness,
       "Toward the posture, in the motions that the task leaves free", "a,b,...|x");
-  add("--null-damping", &CommandOptions::null_damping, "Of the same", "a,b,...|x");
+  add("--null-damping", &CommandOptions::null_damping, "Damping of the same motions", "a,b,...|x");
   add("--payload", &CommandOptions::payload,
       "What the arm carries: mass, and center in the tip's axes; kg, m", "m[,x,y,z]");
   command->add_flag("--release", options->release, "Release the latched fault");
-  command->add_flag("--anyway", options->anyway,
-                    "Send what looks like another order, or like a ratio in place of a damping");
+  command->add_flag(
+      "--anyway", options->anyway,
+      "Send values that look like another order, or like a ratio instead of a damping");
   add("--lcm-url", &CommandOptions::url,
-      "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine", "URL");
+      "Bus; by default LCM_DEFAULT_URL, or multicast within this machine", "URL");
   command->add_option("--timeout", options->timeout, "For a state, and for the answer, s")
       ->transform(quantity("s", 0.01, 3600, "a time from 0.01 to 3600 s"))
       ->option_text("S (2)");

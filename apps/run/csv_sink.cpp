@@ -47,7 +47,7 @@ class CsvSink : public lcmtypes::Sink {
     return keeps([&] {
       file_.write(line_);
       if (utime - flushed_at_ < kFlushPeriod) return;
-      flushed_at_ = utime;  // so that errors are noticed, and a killed run leaves its table
+      flushed_at_ = utime;  // errors are noticed, and a killed run leaves its table
       file_.flush();
     });
   }

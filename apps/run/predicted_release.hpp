@@ -15,9 +15,9 @@ struct PredictedRelease {
   std::string point;  ///< whose amplitudes these are
 };
 
-/// Returns it for a scene whose robot is let go away from its rest, linear about the rest.
-/// Amplitudes are those of the tip's x, y and z, or of the coordinates of matrices. Nothing if it
-/// starts at rest, has elastic gears, or has no modes.
+/// Returns the shares for a scene whose robot is released away from its rest, linear about the
+/// rest. Amplitudes belong to the tip's x, y and z, or to the coordinates of matrices. Nothing if
+/// the robot starts at rest, has elastic gears, or has no modes.
 std::optional<PredictedRelease> predict_release(const Scene& scene);
 
 }  // namespace dashpot::apps

@@ -16,10 +16,10 @@
 namespace dashpot::apps {
 namespace {
 
-constexpr double kRelease = 1e-4;       // rad: what is not linear is that much smaller
+constexpr double kRelease = 1e-4;       // rad: nonlinear terms are smaller by this factor
 constexpr double kDuration = 2;         // s
 constexpr double kSamplePeriod = 1e-3;  // s, or one control period if that is longer
-constexpr double kFarthest = 0.5;       // relative, of two eigenvalues of one mode
+constexpr double kFarthest = 0.5;       // relative distance of eigenvalues of one mode
 
 /// The scene from another start, without pushes and steps, with exact sensors.
 Scene quiet_scene(const Scene& scene, const JointVector& start) {
@@ -40,10 +40,10 @@ Scene quiet_scene(const Scene& scene, const JointVector& start) {
 
 struct RecordedMotion {
   identification::MotionRecord record;  ///< positions
-  dashpot_modes modes{};                ///< the first ones that are there
+  dashpot_modes modes{};                ///< the first ones
 };
 
-/// Nothing if `stopped` says so first.
+/// Returns nothing if `stopped` returns true first.
 std::optional<RecordedMotion> record(const Scene& scene, const ControllerFactory& make_controller,
                                      int every, const std::function<bool()>& stopped) {
   const auto controller = make_controller();
@@ -87,7 +87,7 @@ double distance(const Eigenvalues& wanted, const Eigenvalues& other) {
   return std::sqrt(sum);
 }
 
-/// A row that nothing is known of yet but what was predicted, and where its eigenvalues are.
+/// A row that has only the prediction so far, and its eigenvalues.
 struct Row {
   RingDownMode mode;
   Eigenvalues place;
@@ -105,8 +105,8 @@ std::vector<Row> rows_of(const dashpot_modes& predicted) {
   return rows;
 }
 
-/// The loop of a scene as its drives hold, delay and filter the torque; friction and gravity are
-/// those that the controller believes in.
+/// The loop of a scene as its drives hold, delay and filter the torque; friction and gravity come
+/// from the controller's model.
 controller::PostureLoop sampled_as(const Scene& scene) {
   controller::Settings settings = scene.arm->config.settings;
   settings.period = scene.plant.period;
@@ -116,8 +116,8 @@ controller::PostureLoop sampled_as(const Scene& scene) {
   return {scene.arm->config.model, settings};
 }
 
-/// Adds what the modes become in the sampled loop, and where they are there. A mode that moves
-/// further than kFarthest has no counterpart there that could be told from others.
+/// Adds the modes and eigenvalues of the sampled loop. A mode that moves further than kFarthest has
+/// no counterpart there, because it could be another mode's.
 void add_sampled(const Scene& scene, RingDown& ring_down, std::vector<Row>& rows) {
   controller::PostureLoop at_rest = sampled_as(scene);
   const controller::Setpoint& setpoint = scene.steps.front().setpoint;
@@ -144,7 +144,7 @@ void add_sampled(const Scene& scene, RingDown& ring_down, std::vector<Row>& rows
 }
 
 /// Gives rows the modes of the motion whose eigenvalues are nearest: the motion is the sampled
-/// loop's, in which close modes may change places. One that has none within kFarthest stays alone.
+/// loop's, in which close modes may change places. A row without one within kFarthest stays alone.
 void add_measured(const std::vector<identification::MeasuredMode>& fitted, std::vector<Row>& rows) {
   Eigen::MatrixXd apart(static_cast<Eigen::Index>(rows.size()),
                         static_cast<Eigen::Index>(fitted.size()));
@@ -176,7 +176,7 @@ std::optional<RingDown> measure_ring_down(const Scene& scene,
     const JointVector start = scene.rest + kRelease * JointVector::Unit(scene.dof(), i);
     auto motion = record(quiet_scene(scene, start), make_controller, every, stopped);
     if (!motion) return std::nullopt;
-    // What happens without a release, such as sagging, is not of interest.
+    // Motion without a release, such as sagging, is subtracted.
     motion->record.output -= rest->record.output;
     records.push_back(std::move(motion->record));
   }
@@ -186,7 +186,7 @@ std::optional<RingDown> measure_ring_down(const Scene& scene,
   result.residual = std::sqrt(1 - fit.explained);
   std::vector<Row> rows = rows_of(rest->modes);
   if (scene.arm) add_sampled(scene, result, rows);
-  // Without noise what is found is there, also where a record of an arm would leave it in doubt.
+  // Without noise all found modes exist, even those that would be doubtful in a record of an arm.
   std::vector<identification::MeasuredMode> found = fit.modes;
   found.insert(found.end(), fit.rejected.begin(), fit.rejected.end());
   add_measured(found, rows);

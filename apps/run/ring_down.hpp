@@ -30,17 +30,17 @@ struct RingDown {
   double growth = 0;       ///< of the fastest growing motion of the sampled loop, 1/s
   double gain_margin = 0;  ///< factor by which all gains may grow before the sampled loop becomes
                            ///< unstable; 0 for a system of matrices
-  std::vector<std::string> assumes;     ///< what that loop leaves out
-  std::vector<double> integral_decays;  ///< of the slow modes that the integral makes, 1/s, the
-                                        ///< slowest first; negative where they grow
+  std::vector<std::string> assumes;     ///< assumptions of that loop
+  std::vector<double> integral_decays;  ///< of the slow modes that the integral causes, 1/s, the
+                                        ///< slowest first; negative: growing
 };
 
 using ControllerFactory = std::function<std::unique_ptr<LoopController>()>;
 
 /// Releases the robot near its start, once for each joint, records how it rings down, and
 /// identifies the modes of the motion (identification/identification.hpp). Nothing if `stopped`
-/// says so before all have rung down. Throws InputError, and std::runtime_error if the simulation
-/// fails.
+/// returns true before all have rung down. Throws InputError, and std::runtime_error if the
+/// simulation fails.
 std::optional<RingDown> measure_ring_down(const Scene& scene,
                                           const ControllerFactory& make_controller,
                                           const std::function<bool()>& stopped);

@@ -29,7 +29,7 @@ struct Options {
   std::string scene, url, log, csv, plugin, excite;
   std::optional<double> duration;
   bool fast = false;
-  bool real_time = false;  // which it is unless `fast`
+  bool real_time = false;  // the default, unless `fast`
   bool commands = false;
   bool ring_down = false;
   bool json = false;
@@ -41,7 +41,7 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Opens what the user has named; a failure is bad input.
+/// Calls `open`; a failure is bad input.
 template <class Open>
 auto open_for(const std::string& option, const Open& open) {
   try {
@@ -51,7 +51,7 @@ auto open_for(const std::string& option, const Open& open) {
   }
 }
 
-/// The bus of a run: null in fast motion unless it is asked for.
+/// The bus of a run: null in fast motion unless an option names it.
 std::shared_ptr<lcm::LCM> open_bus(const Options& options) {
   if (!options.url.empty()) {
     return open_for("--lcm-url", [&] { return lcmtypes::open_bus(options.url); });
@@ -138,7 +138,7 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
   return report;
 }
 
-/// Throws if what is written would overwrite what is read, or each other.
+/// Throws if an output would overwrite an input or another output.
 void check_files(const Options& options, const Scene& scene) {
   std::vector<NamedFile> inputs = {{"the scene", options.scene}, {"--plugin", options.plugin}};
   if (scene.arm) inputs.push_back({"the robot description", scene.arm->config.robot.urdf});
@@ -149,7 +149,7 @@ void check_files(const Options& options, const Scene& scene) {
       inputs);
 }
 
-/// Notes drives and sensors of the scene that are slower than those of which modes and margin are.
+/// Notes drives and sensors of the scene that are slower than in the analysis of modes and margin.
 void note_unknown(const sim::PlantOptions& plant, const controller::Analysis::Sampled& known) {
   std::string unknown;
   if (plant.delay > known.delay) unknown += " delay";
@@ -158,8 +158,8 @@ void note_unknown(const sim::PlantOptions& plant, const controller::Analysis::Sa
   }
   if (plant.difference_velocity && !known.difference_velocity) unknown += " difference_velocity";
   if (unknown.empty()) return;
-  print_error("note: simulation has what analysis.sampled is not told:" + unknown +
-              "; the sampled modes and the gain margin are not those of this loop");
+  print_error("note: the simulation has properties that analysis.sampled lacks:" + unknown +
+              "; the sampled modes and the gain margin do not include them");
 }
 
 void run(const Options& options) {
@@ -252,7 +252,7 @@ void add_run(CLI::App& program) {
   command->add_option("scene", options->scene, "Scene file: sim/scenes has examples")
       ->required()
       ->option_text("FILE");
-  command->add_option("--duration", options->duration, "Instead of that of the scene, s")
+  command->add_option("--duration", options->duration, "Duration instead of the scene's, s")
       ->transform(quantity("s", 1e-6, 1e7, "a time from 1e-6 to 1e7 s"))
       ->option_text("S");
   CLI::Option* real_time =
@@ -264,7 +264,7 @@ void add_run(CLI::App& program) {
                     "Take commands from the bus; without it none are taken");
   command
       ->add_option("--lcm-url", options->url,
-                   "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")
+                   "Bus; by default LCM_DEFAULT_URL, or multicast within this machine")
       ->option_text("URL");
   command->add_option("--log", options->log, "LCM log to write")->option_text("FILE");
   command->add_option("--csv", options->csv, "Table of the states to write")->option_text("FILE");

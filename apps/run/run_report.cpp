@@ -16,7 +16,7 @@ namespace {
 
 using Align = TextTable::Align;
 
-/// Tick times in us at and below which this share of the ticks lies.
+/// The tick time, us, that this share of the ticks does not exceed.
 double percentile(const std::vector<std::int32_t>& sorted, double share) {
   if (sorted.empty()) return std::nan("");
   const auto rank = std::lround(share * static_cast<double>(sorted.size() - 1));
@@ -39,7 +39,7 @@ std::string status_text(std::size_t status) {
   return controller::to_text(static_cast<controller::Status>(status));
 }
 
-/// The modes at a `time`, s, with their own time where that is much earlier or later.
+/// The modes at a `time`, s, with their own time if it is much earlier or later.
 std::string modes_text(const char* when, const dashpot_modes& modes, double time) {
   constexpr double kNear = 0.1;  // s
   const double apart = 1e-9 * static_cast<double>(modes.time) - time;
@@ -169,13 +169,13 @@ std::string error_text(const LoopRecord& loop) {
         " rad (m)\n";
   }
   if (loop.damping_level < 1) {
-    out += "  Damping ratios lowered, where the sampled loop bears no more, to " +
+    out += "  Damping ratios lowered, because the sampled loop allows no more, to " +
            format_number(loop.damping_level, 3) + " of what was asked for\n";
   }
   return out;
 }
 
-/// Whether more than a hundredth of the energy that was moved came from nowhere or went there.
+/// Whether more than a hundredth of the energy that was moved is unaccounted for.
 bool doubtful(const sim::EnergyAudit& energy) {
   const double moved = std::abs(energy.by_actuators) + std::abs(energy.by_world) +
                        energy.dissipated() + std::abs(energy.stored.sum() - energy.initial.sum());
@@ -262,8 +262,8 @@ std::string to_table(const RunReport& report) {
     if (!report.drives_text.empty()) out += "\n  " + report.drives_text + "\n";
     if (!report.missing_rotors.empty()) {
       out += "\n  Rotors unknown: " + report.missing_rotors +
-             ". Fast modes and gain\n  margins are those of " + report.without_rotors + ".\n  " +
-             report.rotors_hint + "\n";
+             ". Fast modes and gain\n  margins are computed for " + report.without_rotors +
+             ".\n  " + report.rotors_hint + "\n";
     }
     out += modes_text("start", loop.first_modes, 0) +
            modes_text("end", loop.last_modes, report.simulated_time);

@@ -10,15 +10,15 @@
 
 namespace dashpot::apps {
 
-/// What `dashpot run` has to tell at its end.
+/// The summary of `dashpot run`.
 struct RunReport {
   std::string scene;  ///< the file
   int joints = 0;
   std::string missing_rotors;       ///< of the controller's model, see missing_rotors_text
   std::string without_rotors;       ///< see arm_without_rotors
-  std::string rotors_hint;          ///< where they are found
-  std::string friction_text;        ///< what damps beside the gains; empty: nothing
-  std::string drives, drives_text;  ///< published ones that it has; empty: none
+  std::string rotors_hint;          ///< where their inertia is found
+  std::string friction_text;        ///< damping beside the gains; empty: none
+  std::string drives, drives_text;  ///< published drives of the model; empty: none
   double period = 0;                ///< s
   double wall_time = 0;             ///< s
   Pace pace = Pace::kFast;
@@ -30,8 +30,8 @@ struct RunReport {
   Extremes extremes;
   std::optional<Eigen::Vector3d> contact_force;  ///< of the wall at the end, N; none without one
   lcmtypes::PublisherCounters messages;
-  std::optional<CommandReport> commands;     ///< if any were to be taken
-  std::optional<IdentifyReport> identified;  ///< what followed an excitation
+  std::optional<CommandReport> commands;     ///< if commands were enabled
+  std::optional<IdentifyReport> identified;  ///< from the motion after an excitation
   std::optional<PredictedRelease> release;   ///< if the scene begins with one
   std::optional<RingDown> ring_down;
 };

@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A Panda whose configuration has comments, and knows no payload.
+/// A Panda whose configuration has comments and no payload.
 std::string panda_config(const Scratch& scratch) {
   return scratch.write("arm.yaml",
                        "# my arm\nrobot:\n  urdf: " + testing::arm_path("panda") +
@@ -107,7 +107,7 @@ TEST(CheckModelProgram, FindsColumnsByJointNamesAndUnits) {
   const Json found = check({file, "--config", config});
   EXPECT_NEAR(found["payload"]["mass"].get<double>(), 1.3, 0.02);
   EXPECT_THAT(found["order"].dump(), "[]");
-  // The columns come without names that tell.
+  // Columns without meaningful names.
   const std::function<std::string(int)> letters = [](int j) {
     return std::string(1, static_cast<char>('a' + j));
   };
@@ -133,7 +133,7 @@ TEST(CheckModelProgram, WritesTheGravityOfAnArmThatHangs) {
   text.replace(text.find("robot:"), 6, "robot:\n  gravity: [0, 0, 9.81]");
   const std::string down = scratch.write("down.yaml", text), mended = scratch.path("mended.yaml");
   const Outcome table = run_program({"check-model", file, "--config", down, "--write", mended});
-  EXPECT_THAT(table.out, HasSubstr("those of an arm with robot.gravity: [0, 0, -9.81], not as"));
+  EXPECT_THAT(table.out, HasSubstr("match an arm with robot.gravity: [0, 0, -9.81], not the"));
   EXPECT_THAT(text_of(mended), HasSubstr("gravity: [0, 0, -9.81]"));
   EXPECT_EQ(check({file, "--config", mended})["gravity"], Json());
   EXPECT_EQ(check({file, "--config", down})["gravity"], Json({0, 0, -9.81}));
@@ -158,7 +158,7 @@ TEST(CheckModelProgram, RefusesInOneLineThatNamesTheColumn) {
                  "none.yaml");
   expect_refusal(run_program({"check-model", degrees, "--config", config, "--write", config}),
                  "--write");
-  // Velocities in degrees, though nobody says so.
+  // Velocities in degrees without a unit.
   std::string rates = "time";
   for (int j = 1; j < 8; ++j) rates += ",q" + std::to_string(j);
   for (int j = 1; j < 8; ++j) rates += ",dq" + std::to_string(j);
@@ -191,7 +191,7 @@ TEST(CheckModelProgram, WritesTheConfigurationAndKeepsTheRest) {
   EXPECT_LT(again["joints"][1]["residual_rms"]["before"].get<double>(), 2);  // 5.5
   EXPECT_NEAR(again["payload"]["mass"].get<double>(), 1.3, 0.02);
 
-  // One that cannot be changed in place.
+  // A configuration that cannot be changed in place.
   const std::string anchors = scratch.write(
       "anchors.yaml", "robot: {urdf: " + testing::arm_path("panda") +
                           ", base: panda_link0, tip: panda_hand_tcp, viscous_friction: &a [0, 0, "

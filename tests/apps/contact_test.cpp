@@ -1,4 +1,4 @@
-// dashpot contact as a user runs it, and the warning of what cannot be held.
+// dashpot contact as a user runs it, and the warning of an arm that cannot hold itself.
 #include <dashpot/tests/apps/json_result.hpp>
 
 #include <cmath>
@@ -20,12 +20,13 @@ Json contact(const Words& more) {
 TEST(ContactOfAnArm, BeginsWithTheVerdict) {
   const Words known = joined(kCrisp, {"--drives", "panda", "--touch", "1e5", "--direction", "z"});
   const std::string text = run_program(of_panda("contact", known)).out;
-  EXPECT_THAT(text, AllOf(StartsWith("Bears springs up to "), HasSubstr(" N/m along (0, 0, 1.0); "),
-                          HasSubstr("of the 1.000e+05 N/m asked for: yes; not passive.\n"),
+  EXPECT_THAT(text, AllOf(StartsWith("Stable in contact with springs up to "),
+                          HasSubstr(" N/m along (0, 0, 1.0); "),
+                          HasSubstr("at the 1.000e+05 N/m asked for: yes; not passive.\n"),
                           HasSubstr("proved to be between"), HasSubstr("panda_joint6")));
   const Words unknown = joined(kHome, {"--preset", "libfranka", "--touch", "1e9"});
   EXPECT_THAT(run_program(of_panda("contact", unknown)).out,
-              AllOf(HasSubstr("bears least, as an arm without rotors; of the 1.000e+09 N/m asked "
+              AllOf(HasSubstr("lowest limit, as an arm without rotors; at the 1.000e+09 N/m asked "
                               "for: no; not passive.\n"),
                     HasSubstr("With the published drives panda it is")));
 }

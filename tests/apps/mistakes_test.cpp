@@ -21,11 +21,11 @@ TEST(Mistakes, InNamesOfSubcommandsAreGuessed) {
                                     {"checkmodel", "check-model"},
                                     {"insp", "inspect"}}) {
     expect_refusal(run_program({word, "x"}),
-                   std::string("'") + word + "' is no subcommand; did you mean " + meant + "?");
+                   std::string("'") + word + "' is not a subcommand; did you mean " + meant + "?");
   }
   expect_refusal(run_program({"help"}), "dashpot --help is meant");
   expect_refusal(run_program({"version"}), "dashpot --version is meant");
-  expect_refusal(run_program({"x"}), "'x' is no subcommand; there are analyze, inspect, ");
+  expect_refusal(run_program({"x"}), "'x' is not a subcommand; there are analyze, inspect, ");
 }
 
 TEST(Mistakes, InNamesOfOptionsAreGuessed) {
@@ -90,8 +90,9 @@ TEST(Mistakes, OfASimulationThatTheAnalysisDoesNotKnowAreNoted) {
   const std::string changed_scene =
       changed(scratch, "iiwa14", "sampled: {delay: 1, difference_velocity: true}", "sampled: {}");
   const std::string said = run_scene(changed_scene, {"--duration", "0.05"}).err;
-  EXPECT_THAT(said, ::testing::HasSubstr("note: simulation has what analysis.sampled is not told: "
-                                         "delay difference_velocity; the sampled modes and "));
+  EXPECT_THAT(said,
+              ::testing::HasSubstr("note: the simulation has properties that analysis.sampled "
+                                   "lacks: delay difference_velocity; the sampled modes and "));
   EXPECT_EQ(run_scene(scene("iiwa14"), {"--duration", "0.05"}).err, "");
 }
 
@@ -123,7 +124,7 @@ TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
   EXPECT_THAT(turned.err, ::testing::HasSubstr("warning: task stiffness: 600 N m/rad against "));
   const Outcome percent = run_program(joined(design, {"7"}));
   EXPECT_EQ(percent.status, 0);
-  EXPECT_THAT(percent.err, ::testing::HasSubstr("no percentage: 7 % would be 0.07\n"));
+  EXPECT_THAT(percent.err, ::testing::HasSubstr("not a percentage: 7 % would be 0.07\n"));
   EXPECT_EQ(run_program(joined(design, {"2"})).err, "");
 }
 
