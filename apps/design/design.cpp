@@ -27,7 +27,7 @@ std::string key_of(const analysis::TaskImpedance& impedance) {
   return impedance.jacobian ? "task_damping" : "damping";
 }
 
-/// That of the task's springs, n x n, or of the joints' where there is no task.
+/// The stiffness (n x n) of the task springs, or of the joint springs if there is no task.
 Eigen::MatrixXd controlled_stiffness(const analysis::TaskImpedance& impedance) {
   if (!impedance.jacobian || !impedance.task_stiffness) {
     return impedance.stiffness.value_or(Eigen::MatrixXd());
@@ -35,13 +35,13 @@ Eigen::MatrixXd controlled_stiffness(const analysis::TaskImpedance& impedance) {
   return impedance.jacobian->transpose() * *impedance.task_stiffness * *impedance.jacobian;
 }
 
-/// The damping for one system, and what the loop makes of it where that counts.
+/// The damping for one system, and its effect in the loop if a loop is given.
 struct Found {
   analysis::DampingDesign design;
   std::optional<LoopReport> loop;
 };
 
-/// The loop of the options, with what the robot has of it and the integral of one system.
+/// The loop of the options, with the robot's part of it and the integral of one system.
 analysis::LoopLimit limit_of(const SystemEntry& entry, const DesignOptions& options) {
   const analysis::TaskImpedance& given = entry.impedance;
   analysis::LoopLimit limit{controller::timed(options.timing, entry.loop), options.margin};
@@ -53,7 +53,7 @@ analysis::LoopLimit limit_of(const SystemEntry& entry, const DesignOptions& opti
   return limit;
 }
 
-/// Assumptions of the loop in which the design is judged. Matrices alone say nothing of gravity.
+/// Assumptions of the loop in which the design is judged. Matrices do not include gravity.
 std::vector<std::string> assumed(const DesignOptions& options,
                                  const std::optional<controller::RobotModel>& model) {
   controller::LoopTiming timing = options.timing;
@@ -114,9 +114,9 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
   report.after = make_report(plain, after, spectrum, largest);
   report.gears = entry.loop.gears.any();
   if (report.gears) {
-    if (options.sensitivity) throw InputError("--sensitivity", "does not go with gears that bend");
+    if (options.sensitivity) throw InputError("--sensitivity", "does not go with elastic gears");
     report.notes.emplace_back(
-        "the damping is designed as if no gear gave way; the modes are those with gears that bend");
+        "the damping is designed for rigid gears; the modes include the elastic gears");
   }
   if (options.sensitivity) {
     report.sensitivities = analysis::sensitivities(report.design.system, report.after.spectrum);
@@ -133,26 +133,27 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
   throw entry.error(error);
 }
 
-/// Says what is missing of an arm's rotors, and, where the loop did not bear the ratio, how much
-/// would be enough. Empty if nothing is missing.
+/// Names the rotors that an arm lacks and, if the ratio was lowered, the inertia that would be
+/// enough. Empty if no rotors are missing.
 std::string rotors_note(const DesignOptions& options, const controller::RobotModel& model,
                         const controller::JointVector& q, bool lowered) {
   std::string note = controller::missing_rotors_text(model);
   if (note.empty()) return "";
-  note += options.timing.period > 0 ? ": fast modes, and what the loop bears, are those"
-                                    : ": fast modes are those";
-  note += " of " + controller::arm_without_rotors(model) + ". ";
+  note += options.timing.period > 0 ? ": fast modes and the possible damping are computed"
+                                    : ": fast modes are computed";
+  note += " for " + controller::arm_without_rotors(model) + ". ";
   if (lowered) {
     if (const controller::Drives* published = controller::unknown_rotors(model).published) {
       const controller::RobotModel with_rotors =
           controller::with_at_least(model, published->values(published->reflected_inertia));
-      const std::string with = "With the published drives " + std::string(published->name) + " it ";
+      const std::string with =
+          "With the published drives " + std::string(published->name) + " the loop ";
       try {
         const Found found = design_one(read_arm(options.arm, with_rotors, q), options);
-        note += with + "bears a ratio of " + format_number(found.loop->level * options.ratio, 3) +
+        note += with + "allows a ratio of " + format_number(found.loop->level * options.ratio, 3) +
                 ", margin " + format_number(found.loop->gain_margin, 4) + ". ";
       } catch (const std::runtime_error&) {
-        note += with + "bears none. ";
+        note += with + "allows no ratio. ";
       }
     }
     const analysis::DampingDesign wanted = analysis::design_damping(
@@ -163,9 +164,10 @@ std::string rotors_note(const DesignOptions& options, const controller::RobotMod
           const Found found = design_one(read_arm(options.arm, with_rotors, q), options);
           return found.loop->level == 1;
         });
-    note += enough ? "With " + controller::inertia_text(model, *enough) +
-                         " the loop would bear a ratio of " + format_number(options.ratio, 3) + ". "
-                   : "No reflected inertia would be enough. ";
+    note += enough
+                ? "With " + controller::inertia_text(model, *enough) +
+                      " the loop would allow a ratio of " + format_number(options.ratio, 3) + ". "
+                : "No reflected inertia would be enough. ";
   }
   return note + controller::rotors_hint(model, "--reflected-inertia", "--drives");
 }
@@ -261,7 +263,7 @@ std::vector<JointVector> region_postures(const DesignOptions& options,
   return postures;
 }
 
-/// Where the tip's springs lose a direction, the damping for them is of no use anywhere else.
+/// If the tip springs lose a direction at q, damping designed there is useless at other postures.
 void refuse_singular(const DesignOptions& options, const controller::RobotModel& model,
                      const JointVector& q) {
   if (options.region || options.arm.task_stiffness.empty()) return;
@@ -320,13 +322,13 @@ void run_design(const DesignOptions& options, OutputFile& csv) try {
 }
 
 constexpr const char* kDesignHelp =
-    R"(FILE is as for `dashpot analyze`, with mass, jacobian and task_stiffness; damping is what is
-there already (joint friction, null-space damping). A task_damping is what `before` shows, and what
---near stays near. Without a jacobian the damping is designed in joint space. The matrix is always
-positive semidefinite; a mode that cannot have its ratio is named, with the reason. With --period it
-is one that the sampled loop bears with the margin: the ratio is lowered where it has to be, with
---region the whole matrix, and where that will not do, the exit status is 1. It is 1 as well where
-a region's damping has less than a tenth of the ratio wanted somewhere, or more than is allowed.
+    R"(FILE is as for `dashpot analyze`, with mass, jacobian and task_stiffness; its damping is the
+existing one (joint friction, null-space damping). `before` shows the modes with task_damping, and
+--near keeps the new matrix near it. Without a jacobian the damping is designed in joint space. The
+matrix is always positive semidefinite; a mode that cannot have its ratio is named, with the reason.
+With --period the sampled loop keeps its margin: the ratio is lowered if necessary, with --region
+the whole matrix. The exit status is 1 if no damping keeps the margin, or if the damping of a region
+gives less than a tenth of the wanted ratio somewhere, or more than is allowed.
 )";
 
 }  // namespace

@@ -35,14 +35,14 @@ void add_arm(CLI::App& command, ArmOptions& arm) {
       "x,y,z,rx,ry,rz");
   add("--task-damping,--damping", arm.task_damping, "Diagonal of the one before", "x,y,z,rx,ry,rz");
   add_model_options(command, arm);
-  add("--null-damping", arm.null_damping, "Of the motions that the task leaves free, N m s/rad",
+  add("--null-damping", arm.null_damping, "Damping of motions that the task leaves free, N m s/rad",
       "a,b,...|x (0)");
 }
 
 void add_loop(CLI::App& command, DesignOptions& options) {
   command
       .add_option("--period", options.timing.period,
-                  "Of the control loop: propose only what it bears sampled and held")
+                  "Of the control loop: the sampled loop must keep its gain margin")
       ->transform(control_period())
       ->option_text("S");
   add_loop_options(command, options.timing);

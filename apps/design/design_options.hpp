@@ -17,10 +17,10 @@ struct DesignOptions {
   std::string structure = "full";
   double soft_frequency = analysis::DampingTarget().soft_frequency;  ///< rad/s
   controller::LoopTiming timing;
-  double margin = 2;  ///< of gain, where there is a period
+  double margin = 2;  ///< gain margin, if there is a period
   std::optional<double> largest_ratio;
   int threads = 0;
-  std::string csv;  ///< where the map of the region goes; nowhere if empty
+  std::string csv;  ///< file for the map of the region; none if empty
   bool near = false;
   bool region = false;
   bool sensitivity = false;
@@ -33,7 +33,7 @@ struct DesignOptions {
 /// Adds the options to the subcommand; they are written to `options`.
 void add_design_options(CLI::App& command, DesignOptions& options);
 
-/// Throws InputError for options that do not go together.
+/// Throws InputError for options that exclude each other.
 void check(const DesignOptions& options);
 
 }  // namespace dashpot::apps

@@ -30,7 +30,7 @@ Json to_value(const DampingMiss& miss) {
           {"reason", analysis::to_text(miss.reason)}};
 }
 
-/// Returns what is said of a loop and its margin, but for what follows from them.
+/// Returns the keys of a loop and its margin, without those that follow from them.
 Json limit_value(const analysis::LoopLimit& limit, double gain_margin) {
   return {
       {"period", limit.loop.period},        {"delay", limit.loop.delay},
@@ -77,7 +77,7 @@ Json to_value(const DesignReport& report) {
   return result;
 }
 
-/// The matrix in aligned columns; entries that are rounding beside the largest are 0.
+/// The matrix in aligned columns; entries within the rounding of the largest are 0.
 std::string matrix_text(const MatrixXd& matrix) {
   TextTable table;
   for (Index j = 0; j < matrix.cols(); ++j) table.add_column(Align::kPoint, {});
@@ -132,7 +132,7 @@ std::string loop_margin_text(double gain_margin) {
 std::string loop_text(const DesignReport& report) {
   const LoopReport& loop = *report.loop;
   if (loop.level == 1) return loop_margin_text(loop.gain_margin);
-  return "  The loop bears " + format_number(loop.level * report.ratio, 6) + " instead of " +
+  return "  The loop allows " + format_number(loop.level * report.ratio, 6) + " instead of " +
          format_number(report.ratio, 3) + ": with more damping, a gain margin of " +
          format_number(loop.limit.gain_margin, 3) + " is lost.\n";
 }
@@ -143,7 +143,7 @@ std::string miss_text(const DesignReport& report) {
     return miss.reason != DampingMiss::Reason::kLoop;
   };
   if (std::none_of(report.design.misses.begin(), report.design.misses.end(), misses)) {
-    return std::string(report.gears ? "  If no gear gave way, every mode had a damping ratio of "
+    return std::string(report.gears ? "  With rigid gears every mode has a damping ratio of "
                                     : "  Every mode has a damping ratio of ") +
            format_number(ratio, ratio < report.ratio ? 6 : 3) + ".\n";
   }
@@ -158,13 +158,13 @@ std::string miss_text(const DesignReport& report) {
         text += "; too slow, next to a singularity.\n";
         break;
       case DampingMiss::Reason::kOverdone:
-        text += "; what is there damps too much in some direction.\n";
+        text += "; the existing damping is too large in some direction.\n";
         break;
       case DampingMiss::Reason::kStructure:
         text += "; no matrix of this structure was found that gives it.\n";
         break;
       case DampingMiss::Reason::kCoupling:
-        text += "; no exact matrix was found beside what is there already.\n";
+        text += "; no exact matrix was found in addition to the existing damping.\n";
         break;
       case DampingMiss::Reason::kLoop:
         break;
@@ -178,7 +178,7 @@ std::string miss_text(const DesignReport& report) {
   return text;
 }
 
-/// In lines of at most 100 characters where words allow it.
+/// The note in lines of at most 100 characters, unless a word is longer.
 std::string note_lines(const std::string& note) {
   std::string text, line = "  Note:";
   for (std::size_t at = 0; at < note.size();) {
@@ -194,7 +194,7 @@ std::string note_lines(const std::string& note) {
   return text + line + "\n";
 }
 
-/// The map of a region: what its damping does at one configuration.
+/// One row of the map of a region: the effect of its damping at a configuration.
 struct RegionRow {
   std::size_t index;
   const analysis::RegionSample* sample;
@@ -213,7 +213,7 @@ std::vector<Field<RegionRow>> region_fields(const RegionReport& report) {
   const auto real = [](double Sample::*member) {
     return [member](const RegionRow& row) { return Json(row.sample->*member); };
   };
-  // Where all modes are soft, there is no worst one.
+  // If all modes are soft, no mode is the worst.
   const auto if_any = [](double Sample::*member) {
     return [member](const RegionRow& row) {
       const Sample& sample = *row.sample;
@@ -330,8 +330,8 @@ std::string region_table(const RegionReport& report) {
                    ".\n");
   }
   if (report.limit && design.share < 1) {
-    text += "  The loops bear " + format_number(design.share, 6) +
-            " of the damping found for continuous ones: with more, a gain margin of " +
+    text += "  The loops allow " + format_number(design.share, 6) +
+            " of the damping designed for continuous loops: with more, a gain margin of " +
             format_number(report.limit->gain_margin, 3) + " is lost, first at configuration [" +
             std::to_string(design.margin_sample) + "].\n";
   } else if (report.limit) {
@@ -344,8 +344,8 @@ std::string region_table(const RegionReport& report) {
 std::string region_complaint(const RegionReport& report) {
   const analysis::RegionDesign& design = report.design;
   if (design.violation > 1e-6) {
-    return "what is there already damps more than --largest-ratio allows, by " +
-           format_number(design.violation, 3) + "; allow more, or take friction away";
+    return "the existing damping exceeds --largest-ratio by " + format_number(design.violation, 3) +
+           "; allow more, or take friction away";
   }
   if (design.worst_sample < 0) return "";
   const analysis::RegionSample& worst =

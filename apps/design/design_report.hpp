@@ -10,17 +10,17 @@
 
 namespace dashpot::apps {
 
-/// What the sampled loop makes of a design.
+/// A design in the sampled loop.
 struct LoopReport {
   analysis::LoopLimit limit;
-  double level = 1;  ///< of the ratio wanted, that the loop bears
+  double level = 1;  ///< share of the wanted ratio that the loop allows
   double gain_margin = 0;
   analysis::SampledSpectrum sampled;
 };
 
 /// What `dashpot design` says of one system.
 struct DesignReport {
-  std::string key;  ///< of the matrix: "task_damping", or "damping" where there is no jacobian
+  std::string key;  ///< of the matrix: "task_damping", or "damping" if there is no jacobian
   double ratio = 0;
   analysis::TaskImpedance impedance;  ///< with the new damping
   analysis::DampingDesign design;
@@ -32,7 +32,7 @@ struct DesignReport {
   std::optional<Eigen::VectorXd> q;  ///< of an arm, rad or m
   std::string rotors;                ///< of an arm: "known" or "unknown"
   std::string drives;                ///< name of the published drives that it has; empty: none
-  bool gears = false;                ///< that bend, in `before` and `after`, but not in `design`
+  bool gears = false;                ///< elastic, in `before` and `after`, but not in `design`
 };
 
 /// What `dashpot design --region` says.
@@ -49,15 +49,15 @@ std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
 std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
 std::string region_json(const RegionReport& report);
 std::string region_table(const RegionReport& report);
-/// Returns what the answer lacks of what was asked: less than a tenth of the ratio somewhere, or
-/// more than is allowed. Empty if neither.
+/// Returns why the damping is not as wanted: less than a tenth of the ratio somewhere, or more than
+/// is allowed. Empty if it is.
 std::string region_complaint(const RegionReport& report);
-/// The map of the worst mode, a line for each configuration after one of headings.
+/// The map of the worst mode: a line of headings, then one for each configuration.
 std::string region_csv(const RegionReport& report);
 
-/// How frequencies and ratios answer to the entries of the matrices, one object for each mode: the
-/// gradients by M, C, K, by C_C and K_C where there is a jacobian, by a point mass at its origin
-/// (`payload`, per kg) where it has six rows, and by each joint's inertia and friction.
+/// The gradients of frequencies and ratios, one object for each mode: by the entries of M, C and K;
+/// by C_C and K_C if there is a jacobian; by a point mass at its origin (`payload`, per kg) if it
+/// has six rows; and by each joint's inertia and friction.
 Json sensitivity_json(const DesignReport& report);
 
 /// Writes them for people: percent by one percent of diagonal entries, by 1 kg of payload, and by

@@ -18,7 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Number = MatrixXd ModeGradient::*;
 
-/// Gradient by a point mass at the origin of the task: dM = J_v' J_v for 1 kg.
+/// Gradient by a point mass at the origin of the task: dM = J_v' J_v per kg.
 std::optional<double> by_payload(const DesignReport& report, const MatrixXd& by_mass) {
   const auto& J = report.impedance.jacobian;
   if (!J || J->rows() != 6) return std::nullopt;

@@ -1,4 +1,4 @@
-// `dashpot design --period`: what a sampled loop bears, of a mass under a held force.
+// `dashpot design --period`: the damping that a sampled loop allows, for a mass under a held force.
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
@@ -51,11 +51,11 @@ TEST(DesignForALoop, LowersTheRatioToWhatKeepsTheMarginAndSaysSo) {
   EXPECT_EQ(result["misses"][0]["wanted"], 2);
   const Outcome table = design(kMass, options);
   EXPECT_EQ(table.status, 0);
-  EXPECT_THAT(table.out, HasSubstr("The loop bears 1.56250 instead of 2.00"));
+  EXPECT_THAT(table.out, HasSubstr("The loop allows 1.56250 instead of 2.00"));
   EXPECT_THAT(table.out, HasSubstr("Every mode has a damping ratio of 1.56250"));
 }
 
-// Friction of the joints acts at once: it takes none of what the loop bears.
+// Friction of the joints acts at once, so it does not reduce the damping that the loop allows.
 TEST(DesignForALoop, TakesTheDampingThatIsThereForTheJointsOwn) {
   const Json result =
       design_json(kMass + "damping: [[40]]\n", {"--damping-ratio", "2.5", "--period", "0.02"});
@@ -66,7 +66,7 @@ TEST(DesignForALoop, TakesTheDampingThatIsThereForTheJointsOwn) {
   EXPECT_GT(result["modes"][0]["damping_ratio"], without + 0.3);
 }
 
-/// What it makes of eigenvalues and margin is in controller_memory_test.cpp.
+/// controller_memory_test.cpp tests the eigenvalues and the margin.
 TEST(DesignForALoop, CountsTheIntegralOfTheSprings) {
   const std::vector<std::string> options = {"--damping-ratio", "0.4", "--period", "0.02",
                                             "--delay",         "1",   "--margin", "1.1"};
@@ -79,7 +79,7 @@ TEST(DesignForALoop, CountsTheIntegralOfTheSprings) {
   EXPECT_NEAR(result["loop"]["integral_decays"][0].get<double>(), 2, 0.3);
   EXPECT_THAT(design(kMass, with).out, HasSubstr("The integral of the springs makes 1 slow mode, "
                                                  "which decays at "));
-  // Quicker than the mass follows: nothing is proposed.
+  // The integral is quicker than the mass: nothing is proposed.
   with.back() = "20 ms";
   EXPECT_EQ(design(kMass, with).status, 1);
 }
@@ -108,7 +108,7 @@ TEST(DesignForALoop, ProposesNothingWhereNoRatioWillDo) {
   EXPECT_EQ(count_lines(outcome.err), 1);
   EXPECT_THAT(outcome.err,
               HasSubstr("[0]: no damping ratio up to 0.0900 keeps a gain margin of 2"));
-  // Stable where c / k > period / 2, whatever the share of both.
+  // Stable if c / k > period / 2, at any share of both.
   EXPECT_THAT(
       design("{mass: [[0.2]], stiffness: [[800]]}\n", {"--damping-ratio", "1", "--period", "0.1"})
           .err,
@@ -129,7 +129,7 @@ TEST(DesignForALoop, LowersTheDampingOfARegionToWhatEveryLoopBears) {
   EXPECT_NEAR(loop["share"], 200 / 1.6 / free, 1e-5);
   EXPECT_NEAR(result["samples"][0]["gain_margin"], 3.2, 1e-3);
   const Outcome table = design(list, options);
-  EXPECT_THAT(table.out, HasSubstr("The loops bear 0."));
+  EXPECT_THAT(table.out, HasSubstr("The loops allow 0."));
   EXPECT_THAT(table.out, HasSubstr("first at configuration [1]"));
   EXPECT_THAT(table.out, HasSubstr("margin"));
   const Scratch scratch;

@@ -1,4 +1,4 @@
-// What the program says of an arm whose rotors are not told, public drives, and bodies at the tip.
+// Messages about an arm with unknown rotors, public drives, and bodies at the tip.
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
@@ -79,10 +79,11 @@ TEST(RotorsOfDesign, AreNamedWhereTheLoopBearsLess) {
   EXPECT_EQ(plain["rotors"], "unknown");
   ASSERT_EQ(plain["notes"].size(), 2U);
   EXPECT_THAT(plain["notes"][1].get<std::string>(), HasSubstr("friction"));
-  EXPECT_THAT(plain["notes"][0].get<std::string>(),
-              AllOf(HasSubstr("no reflected inertia of any joint"),
-                    HasSubstr("With the published drives panda it bears"),
-                    HasSubstr("the loop would bear a ratio of 1.00"), HasSubstr("--drives panda")));
+  EXPECT_THAT(
+      plain["notes"][0].get<std::string>(),
+      AllOf(HasSubstr("no reflected inertia of any joint"),
+            HasSubstr("With the published drives panda the loop allows"),
+            HasSubstr("the loop would allow a ratio of 1.00"), HasSubstr("--drives panda")));
   const Json known =
       parse(run_program(of_panda("design", joined(options, {"--json", "--drives", "panda"}))));
   EXPECT_EQ(known["rotors"], "known");
