@@ -41,7 +41,7 @@ std::int64_t utime_now() {
   return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
 }
 
-/// Puts what arrives on the driver's channels aside: of several statuses the newest.
+/// Keeps the newest status of the driver, and passes its commands on to the session.
 class Inbox {
  public:
   Inbox(lcm::LCM& bus, lcmtypes::DriverKind driver, DriveSession& session)
@@ -76,17 +76,17 @@ class Inbox {
   DriveSession& session_;
 };
 
-/// Answers statuses until the user, or the time, or a refusal ends it. In the first two cases the
-/// arm stops and the torque fades before that. Returns why it ended.
+/// Answers statuses until the user, the time or a refusal ends it. In the first two cases the arm
+/// first stops and the torque fades. Returns why it ended.
 std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::DriverKind driver,
                      DriveSession& session) {
   constexpr int kWait = 50;       // ms
-  constexpr double kSilence = 2;  // s without a status, before the user is told
+  constexpr double kSilence = 2;  // s without a status until a message is printed
   const lcmtypes::DriverProfile& profile = lcmtypes::profile_of(driver);
   Inbox inbox(bus, driver, session);
   lcmtypes::DriverCommand command;
   std::vector<std::uint8_t> bytes;
-  using Clock = std::chrono::steady_clock;  // whatever becomes of the computer's time of day
+  using Clock = std::chrono::steady_clock;  // the time of day may be set meanwhile
   const auto since = [](Clock::time_point then) {
     return std::chrono::duration<double>(Clock::now() - then).count();  // s
   };
@@ -198,7 +198,7 @@ void drive(const DriveOptions& options) {
   DriveReport report;
   DriveSession session(file.config, *controller, goal, journal, {driver, options.dry_run});
   const StopSignal stop;
-  std::signal(SIGPIPE, SIG_IGN);  // who stops reading must not end the loop in the middle
+  std::signal(SIGPIPE, SIG_IGN);  // a reader that closes its pipe must not end the loop
   lock_memory();
   publisher.start();
   schedule_ahead_of_others();
@@ -259,7 +259,7 @@ void add_drive(CLI::App& program) {
       ->option_text("S");
   command
       ->add_option("--lcm-url", options->url,
-                   "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")
+                   "Bus; by default LCM_DEFAULT_URL, or multicast within this machine")
       ->option_text("URL");
   command->add_option("--log", options->log, "LCM log to write")->option_text("FILE");
   command->add_option("--excite", options->excite, kExciteHelp)->option_text("SPEC");

@@ -12,7 +12,7 @@
 namespace dashpot::apps {
 namespace {
 
-/// The latency at and below which this share of the commands lies, us.
+/// The latency that this share of the commands does not exceed, us.
 double latency_at(const DriveRecord& drive, double share) {
   const std::int64_t wanted = std::llround(share * static_cast<double>(drive.commands));
   std::int64_t count = 0;

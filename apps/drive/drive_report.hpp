@@ -8,7 +8,7 @@
 
 namespace dashpot::apps {
 
-/// What `dashpot drive` has to tell at its end.
+/// The summary of `dashpot drive`.
 struct DriveReport {
   std::string config;  ///< the file
   lcmtypes::DriverKind driver = lcmtypes::DriverKind::kIiwa;
@@ -18,8 +18,8 @@ struct DriveReport {
   DriveRecord drive;
   LoopRecord loop;
   lcmtypes::PublisherCounters messages;
-  std::optional<CommandReport> commands;     ///< if any were to be taken
-  std::optional<IdentifyReport> identified;  ///< what followed an excitation
+  std::optional<CommandReport> commands;     ///< if commands were enabled
+  std::optional<IdentifyReport> identified;  ///< from the motion after an excitation
 };
 
 /// For people: lines, each ended by a newline.

@@ -16,20 +16,20 @@ using lcmtypes::DriverCommand;
 using lcmtypes::DriverKind;
 using lcmtypes::DriverStatus;
 
-constexpr std::int64_t kWatch = 300'000;  // us of statuses before the start
-constexpr std::size_t kFewest = 20;       // of them
-constexpr double kPeriodTolerance = 0.2;  // of the period
-constexpr double kOldest = 2;             // periods that a status may be old when it is answered
+constexpr std::int64_t kWatch = 300'000;        // us of statuses before the start
+constexpr std::size_t kFewest = 20;             // of them
+constexpr double kPeriodTolerance = 0.2;        // of the period
+constexpr double kOldest = 2;                   // largest age of an answered status, periods
 constexpr std::int64_t kSameClock = 1'000'000;  // us between the driver's clock and the time of day
-constexpr std::int64_t kDrift = 1000;    // of a clock's time, by which the other one may differ
+constexpr std::int64_t kDrift = 1000;           // 1/kDrift: largest drift between the clocks
 constexpr double kUpright = 0.9998;      // cosine of the largest angle of an upright base, 1 deg
-constexpr double kNearLimit = 0.8;       // of an external torque with which the driver stops
+constexpr double kNearLimit = 0.8;       // share of the external torque at which the driver stops
 constexpr std::size_t kRemembered = 64;  // commands sent
 constexpr double kFade = 0.2;            // s from a stop to no torque, at least
-constexpr std::int64_t kLongestStop = 1'000'000;  // us: the torque fades then, whatever moves
-constexpr std::int64_t kLook = 100'000;           // us between two looks at an arm that stops
-constexpr double kStands = 1e-3;                  // rad between two looks at an arm that stands
-// us: what comes later is no time of a clock, and nanoseconds would not fit.
+constexpr std::int64_t kLongestStop = 1'000'000;  // us: the torque fades then in any case
+constexpr std::int64_t kLook = 100'000;           // us between two checks of a stopping arm
+constexpr double kStands = 1e-3;                  // rad between two checks: less is standstill
+// us: a later time is invalid, and does not fit into nanoseconds.
 constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() / 2000;
 
 bool finite(const DriverStatus& status) {
@@ -57,13 +57,13 @@ void check_loop(const controller::Config& config, DriverKind driver) {
   if (driver == DriverKind::kIiwa && !loop.difference_velocity) {
     throw InputError(
         "analysis.sampled.difference_velocity",
-        "must be true with --iiwa: velocities are differenced here, because those of the "
-        "driver went through its low-pass of 40 Hz");
+        "must be true with --iiwa: velocities are differences of positions here, because the "
+        "driver filters its velocities with a low-pass of 40 Hz");
   }
   if (driver == DriverKind::kPanda && !(loop.cutoff > 0)) {
     throw InputError(
         "analysis.sampled.cutoff",
-        "must be that of the driver's low-pass on torques with --panda: 27.484 Hz for its "
+        "must be the cutoff of the driver's low-pass on torques with --panda: 27.484 Hz for its "
         "--low_pass_freq of 30 Hz");
   }
 }
@@ -136,7 +136,7 @@ bool DriveSession::take(const DriverStatus& status, std::int64_t arrived, std::i
   }
   if (restarted_ || interval > kWatch) quiet_until_ = status.utime + kWatch;
   restarted_ = false;
-  if (status.utime < quiet_until_) {  // the driver may be another one, which a command would end
+  if (status.utime < quiet_until_) {  // after a restart a command would end the driver
     ++record.awaited;
     fastest_.reset();  // the iiwa's driver is still learning the robot's clock
     return false;
@@ -168,23 +168,23 @@ bool DriveSession::take(const DriverStatus& status, std::int64_t arrived, std::i
                      static_cast<std::int32_t>(
                          std::min<std::int64_t>(took, std::numeric_limits<std::int32_t>::max())));
   journal_.end_tick();
-  if (ending_) journal_.record.last_modes = modes_;  // a brake has none to tell of
+  if (ending_) journal_.record.last_modes = modes_;  // a brake reports no modes
   fade(status.utime);
-  if (options_.dry_run) {  // somebody else moves the arm as he likes: that is no fault of this loop
+  if (options_.dry_run) {  // another program moves the arm: its faults do not matter
     if (journal_.record.fault != DASHPOT_OK) goal_.release();
     return false;
   }
   note_fault(code);
-  // On the driver's clock, by which the Panda's driver lets a command expire.
+  // On the driver's clock, because the Panda's driver lets commands expire by it.
   command.utime = status.utime;
-  // The message wants one; it is what the driver itself commands with --torque_only.
+  // The driver itself commands this position with --torque_only.
   command.position = options_.driver == DriverKind::kIiwa ? last_position_ : JointVector();
   command.torque = torque_;
   if (controller_.needs_brakes()) engage(code, command);
   return true;
 }
 
-/// Tells of a fault, and of what is worse than it and comes later.
+/// Warns of a fault, and of worse statuses after it.
 void DriveSession::note_fault(std::int32_t code) {
   const LoopRecord& loop = journal_.record;
   if (loop.faults > faults_ || loop.fault == DASHPOT_OK) told_ = DASHPOT_FAULT_LATCHED;
@@ -210,9 +210,9 @@ void DriveSession::engage(std::int32_t code, DriverCommand& command) {
              "; nothing more is sent";
 }
 
-/// LCM tells when it read a status, which may be long after that came: it looks for the kernel's
-/// time only where it had no message before. So what a status took longer than the fastest one
-/// counts as well, if the driver's clock is that of the day. The two clocks may drift apart.
+/// LCM gives the time when it read a status, perhaps long after the arrival: it asks for the
+/// kernel's time only if no message was waiting. So the delay beyond the fastest status counts as
+/// well, if the driver's clock shows the time of day. The two clocks may drift apart.
 void DriveSession::note_age(std::int64_t utime, std::int64_t interval, std::int64_t arrived,
                             std::int64_t now) {
   sent_at_ = arrived;
@@ -238,7 +238,7 @@ bool DriveSession::fresh(std::int64_t now) {
                            " s all statuses were older than two periods: nothing more is sent");
 }
 
-/// A clock that went back would leave every status unanswered, without a word.
+/// Reports a clock that went back, because every status would stay unanswered.
 void DriveSession::note_repeated(const DriverStatus& status) {
   ++record.repeated;
   if (1e-6 * static_cast<double>(last_ - status.utime) < 1e-6 * kWatch) return;
@@ -258,7 +258,7 @@ double DriveSession::end_time() const noexcept {
   return 1e-6 * static_cast<double>(kLongestStop + fade_);
 }
 
-/// Whether the arm that stops has moved no more between two looks, or takes too long for it.
+/// True if a stopping arm has not moved between two checks, or takes too long to stop.
 bool DriveSession::stands(std::int64_t utime) {
   if (!stopping_since_) stopping_since_ = utime;
   if (utime - *stopping_since_ >= kLongestStop) return true;
@@ -269,7 +269,7 @@ bool DriveSession::stands(std::int64_t utime) {
   return stood;
 }
 
-/// Scales the torque to zero from the moment the arm stands, once the end was asked for.
+/// After end() was called, scales the torque to zero from standstill on.
 void DriveSession::fade(std::int64_t utime) {
   if (!ending_) return;
   if (!fading_since_ && !stands(utime)) return;
@@ -279,7 +279,7 @@ void DriveSession::fade(std::int64_t utime) {
   ended_ = share <= 0;
 }
 
-/// Begins once enough was seen. What is not in order is said after the time it takes to be sure.
+/// Begins after enough statuses. Reports faults of the statuses once they are certain.
 void DriveSession::watch(const DriverStatus& status, bool late) {
   if (first_ == 0) {
     first_ = status.utime;
@@ -294,7 +294,7 @@ void DriveSession::watch(const DriverStatus& status, bool late) {
   const bool enough = status.utime - first_ >= kWatch && intervals_.size() >= kFewest && !late;
   if (!enough) return;
   if (!finite(status)) {
-    throw InputError("", "the driver's status has positions or velocities that are no numbers");
+    throw InputError("", "the driver's status has NaN or infinity as a position or velocity");
   }
   if (foreign_ && !options_.dry_run) {
     throw InputError("", std::string("somebody else commands on ") + profile_.command_channel +
@@ -305,9 +305,9 @@ void DriveSession::watch(const DriverStatus& status, bool late) {
   begin(status);
 }
 
-/// With --torque_only the driver commands each position that it measures. With springs of KUKA's it
-/// commands the one where they are fixed. Commands then lead them with the arm, so that they only
-/// damp; the configuration has to say how much, and no stiffness.
+/// With --torque_only the driver commands each position that it measures. With KUKA's springs it
+/// commands the position where they are fixed. Commands then move the springs with the arm, so that
+/// they only damp; the configuration must give this damping, and no stiffness.
 void DriveSession::check_springs() {
   const bool known = first_commanded_.allFinite() && !first_commanded_.isZero(0);
   if (options_.driver != DriverKind::kIiwa || !known || !moved_ || recommanded_) return;
@@ -353,7 +353,7 @@ void DriveSession::begin(const DriverStatus& status) {
   setpoint.tip_pose = {there.p_BT_B, there.R_BT};
   setpoint.wrench.setZero();
   goal_.begin(setpoint, config_.model.attachment());
-  fastest_.reset();  // the iiwa's driver was still learning the robot's clock
+  fastest_.reset();  // until now the iiwa's driver may not have known the robot's clock
   running_ = true;
 }
 

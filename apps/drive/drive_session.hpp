@@ -12,11 +12,11 @@
 
 namespace dashpot::apps {
 
-/// What was seen of a driver.
+/// Counts and times of the messages to and from a driver.
 struct DriveRecord {
-  std::int64_t statuses = 0;    ///< that arrived and could be read
-  std::int64_t unreadable = 0;  ///< messages on the status channel that are no status of this arm
-  std::int64_t repeated = 0;    ///< statuses no newer than one before: not answered
+  std::int64_t statuses = 0;    ///< readable ones that arrived
+  std::int64_t unreadable = 0;  ///< messages on the status channel other than this arm's statuses
+  std::int64_t repeated = 0;    ///< statuses not newer than an earlier one: not answered
   std::int64_t overtaken = 0;   ///< statuses with a newer one behind them: not answered
   std::int64_t late = 0;        ///< statuses older than two periods: not answered
   std::int64_t awaited = 0;     ///< statuses after a pause of the driver: not answered
@@ -25,8 +25,8 @@ struct DriveRecord {
   std::int64_t commands = 0;    ///< sent
   double period = 0;            ///< measured before the start, s
   JointVector external;         ///< greatest external torque of each joint, N m
-  /// Commands by the time from a status's arrival to the command, us; the last: longer ones. It
-  /// does not grow, because that would take the loop milliseconds after an hour.
+  /// Commands by the time from a status's arrival to the command, us; the last: longer ones. The
+  /// size is fixed, because growing takes the loop milliseconds after an hour.
   std::vector<std::int64_t> latencies = std::vector<std::int64_t>(20'000);
   double longest_latency = 0;  ///< us
 };
@@ -37,8 +37,8 @@ struct DriveRecord {
 /// Before the first command, statuses are watched for 0.3 s. Then the springs start where the robot
 /// is. A status that is repeated, out of order, or older than two periods is not answered; after a
 /// gap longer than watchdog.longest_gap the controller latches a fault. A driver whose robot has
-/// stopped by itself is not answered until it goes on, and one that paused for 0.3 s, or whose
-/// clock is not known any more, only after 0.3 s of statuses: it may have been restarted.
+/// stopped by itself is not answered until it goes on. A driver that paused for 0.3 s, or whose
+/// clock became unknown, is answered only after 0.3 s of statuses: it may have been restarted.
 class DriveSession {
  public:
   struct Options {
@@ -56,34 +56,34 @@ class DriveSession {
   /// std::runtime_error if it must not go on.
   bool take(const lcmtypes::DriverStatus& status, std::int64_t arrived, std::int64_t now,
             lcmtypes::DriverCommand& command);
-  /// Whether `command` may still be sent. It is too late for that if the status is too old by now,
-  /// as far as the driver's clock is the time of day: in lock-step a status waits for its answer.
+  /// True unless the status is too old for `command` to be sent. Always true if the driver's clock
+  /// is not the time of day: in lock-step a status waits for its answer.
   bool may_send(std::int64_t now) { return !fastest_ || fresh(now); }
   /// Notes a command on the driver's channel. Nothing throws: LCM calls it.
   void hear_command(const void* data, std::size_t size) noexcept;
   /// True if somebody else commands beside this session, which must then end.
   bool rivalled() const noexcept;
-  /// What was sent, so that it is known when it is heard.
+  /// Notes a command that was sent, to recognise it when it is heard.
   void note_sent(const std::vector<std::uint8_t>& bytes, double latency);
 
-  /// The arm stops, and then the torque fades: it is zero when this has ended.
+  /// The arm stops, and then the torque fades to zero.
   void end() noexcept;
   bool ended() const noexcept { return ended_; }
-  /// How long that takes at the most, s.
+  /// The longest time that end() takes, s.
   double end_time() const noexcept;
-  /// Why the robot needs its own brakes: the last command was sent that is to be. "": it does not.
+  /// Why the robot needs its own brakes, after the last command was sent; "": it does not.
   const std::string& engaged() const noexcept { return engaged_; }
 
   bool running() const noexcept { return running_; }
-  /// In one line what the user should know at once; "" if there is nothing new.
+  /// One line that the user should see at once; "" if there is nothing new.
   std::string warning();
 
   DriveRecord record;
 
  private:
   void note_age(std::int64_t utime, std::int64_t interval, std::int64_t arrived, std::int64_t now);
-  /// Whether the status that was taken may be answered; if not, it counts as late. Throws
-  /// std::runtime_error if all were late for long.
+  /// True if the status that was taken may be answered; otherwise it counts as late. Throws
+  /// std::runtime_error if all statuses were late for long.
   bool fresh(std::int64_t now);
   double age(std::int64_t now) const noexcept;  ///< of the status that was taken, s
   void note_repeated(const lcmtypes::DriverStatus& status);
@@ -115,8 +115,8 @@ class DriveSession {
   JointVector last_position_;
   std::int64_t measured_at_ = 0;  ///< utime of last_position_
   std::int64_t repeated_ = 0;     ///< old statuses since the last new one
-  std::int64_t sent_at_ = 0;      ///< when the status that was taken was sent, at the latest, us
-  /// The least time from a status's utime, which has to be a time of day, until it was taken, us.
+  std::int64_t sent_at_ = 0;      ///< latest time at which the status taken may have been sent, us
+  /// The shortest time from a status's utime, a time of day, until it was taken, us.
   std::optional<std::int64_t> fastest_;
   std::int64_t lates_ = 0;        ///< since the last status that was not late
   bool restarted_ = false;        ///< the driver's clock was not known while this ran
@@ -125,10 +125,10 @@ class DriveSession {
   dashpot_modes modes_{};  ///< of the springs, before the end
   std::int64_t fade_;      ///< us
   std::optional<std::int64_t> stopping_since_, fading_since_;
-  std::int64_t seen_at_ = 0;        ///< while it stops: utime of seen_
-  JointVector seen_;                ///< where it was then
+  std::int64_t seen_at_ = 0;        ///< while the arm stops: utime of seen_
+  JointVector seen_;                ///< position then
   std::int64_t faults_ = 0;         ///< so far
-  std::int32_t told_ = DASHPOT_OK;  ///< the worst status since the fault that the user was told of
+  std::int32_t told_ = DASHPOT_OK;  ///< the worst status since the fault that was reported
   std::string engaged_;
   JointVector torque_;
   std::deque<std::vector<std::uint8_t>> sent_;  ///< the last ones

@@ -22,7 +22,7 @@ struct ExportOptions {
   std::string log, mcap, csv;
 };
 
-/// ns; a time before 1970, or beyond what 64 bits hold, is taken as the nearest that can be said.
+/// ns; a time before 1970, or beyond the range of 64 bits, becomes the nearest possible one.
 std::uint64_t nanoseconds(std::int64_t utime) {
   constexpr std::int64_t kLatest = INT64_MAX / 1000;
   return static_cast<std::uint64_t>(std::clamp<std::int64_t>(utime, 0, kLatest)) * 1000;
@@ -86,8 +86,8 @@ void export_log(const ExportOptions& options) {
   } catch (const std::runtime_error& error) {
     throw InputError("", error.what());
   }
-  // A file that is no log is refused before an output is emptied.
-  if (!reader->read()) throw InputError(options.log, "is no LCM log");
+  // An input that is not a log is refused before an output is emptied.
+  if (!reader->read()) throw InputError(options.log, "is not an LCM log");
   std::optional<McapExport> mcap;
   std::optional<CsvExport> csv;
   if (!options.mcap.empty()) mcap.emplace(options.mcap);

@@ -34,11 +34,11 @@ JointVector vector(const Seven& values) {
 
 sim::PlantOptions plant_options(const Scene& scene) {
   sim::PlantOptions options = scene.plant;
-  options.delay = 0;  // here, because what acts without commands is not delayed
+  options.delay = 0;  // FakeDriver delays commands alone
   return options;
 }
 
-/// Returns the gain of the low-pass that both drivers have: y += gain (u - y) once a period.
+/// Returns the gain of both drivers' low-pass: y += gain (u - y) once a period.
 double low_pass_gain(double cutoff, double period) {
   return period / (period + 1 / (2 * std::numbers::pi * cutoff));
 }
@@ -71,7 +71,7 @@ void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime) {
                              " positions");
   }
   if (!command.torque.allFinite() || !command.position.allFinite()) {
-    throw std::runtime_error("a command has a number that is none");
+    throw std::runtime_error("a command has NaN or infinity");
   }
   if (!iiwa && command.control_mode != 4) {
     throw std::runtime_error("a command expects control mode " +
@@ -108,7 +108,7 @@ JointVector FakeDriver::torque_of_iiwa(bool counts) const {
   return counts ? JointVector(command_->torque + pull) : pull;
 }
 
-/// In the order of libfranka.
+/// Low-pass, then rate limit: the order of libfranka.
 JointVector FakeDriver::filtered(const JointVector& torque) {
   const double most = kTorqueRate * period();
   const JointVector change = low_pass_gain(kTorqueCutoff, period()) * (torque - last_torque_);
@@ -116,8 +116,8 @@ JointVector FakeDriver::filtered(const JointVector& torque) {
   return last_torque_;
 }
 
-/// A step h of the implicit Euler method, which acts at once, because the model has no rotors: its
-/// wrist would not bear these gains a period late.
+/// A step h of the implicit Euler method, without delay, because the model has no rotors: its wrist
+/// is unstable with these gains a period late.
 ///     (M + h D + h^2 K) qd+ = M qd + h K (q_h - q),  torque = K (q_h - q - h qd+) - D qd+
 JointVector FakeDriver::resting_torque() {
   const JointVector& q = plant_->measured().position;

@@ -9,14 +9,14 @@
 
 namespace dashpot::apps {
 
-/// A simulated arm behind a driver's messages, as the public drivers behave where torques are
-/// commanded: their filters, what they do without commands, and what they die of. A command acts a
-/// period after its status, or later if the scene's `delay` says so.
+/// A simulated arm behind a driver's messages. It behaves like the public drivers under torque
+/// commands: their filters, their torque without commands, the commands that end them. A command
+/// acts a period after its status, or later by the scene's `delay`.
 ///
 /// iiwa (`--torque_only`): without a command for 0.05 s, and before the first, the driver's PD
 /// controller holds the position of that moment; torques count again with the next command, without
 /// blending. Velocities are differences through a low-pass of 40 Hz. utime is -1 for the first 200
-/// statuses. It dies of a command within 0.25 s of the first status, and of arrays of another
+/// statuses. It ends at a command within 0.25 s of the first status, and at arrays of another
 /// length.
 ///
 /// With `environment.joint_stiffness` or `joint_damping` in its scene, the iiwa is in KUKA's mode
@@ -24,10 +24,10 @@ namespace dashpot::apps {
 ///
 /// Panda (`--control_mode torque`): a command whose utime is more than 0.1 s in the past or the
 /// future does not count; without one that counts, joints are damped. Torques pass libfranka's
-/// low-pass of 30 Hz and rate limit of 1000 N m/s. It dies of anything but seven torques, no
+/// low-pass of 30 Hz and rate limit of 1000 N m/s. It ends at anything but seven torques, no
 /// positions, and control mode 4.
 ///
-/// The driver compensates gravity, so that the scene's robot has none.
+/// The driver compensates gravity, so the scene's robot has none.
 class FakeDriver {
  public:
   /// `scene` has to outlive it. Throws InputError.
@@ -35,11 +35,11 @@ class FakeDriver {
 
   double period() const noexcept { return scene_.plant.period; }
   /// Takes a command that arrived at `utime` of the driver's clock, us.
-  /// Throws std::runtime_error with what the driver dies of.
+  /// Throws std::runtime_error with the reason if the command ends the driver.
   void take(const void* data, std::size_t size, std::int64_t utime);
-  /// Moves the robot by one period, with the time at its end.
+  /// Moves the robot by one period, which ends at `utime`.
   void step(std::int64_t utime);
-  /// Returns what the driver reports now.
+  /// Returns the present status.
   lcmtypes::DriverStatus status(std::int64_t utime) const;
 
   double time() const noexcept { return plant_->time(); }
@@ -49,11 +49,11 @@ class FakeDriver {
   std::int64_t uncommanded() const noexcept { return uncommanded_; }
 
  private:
-  /// Returns what acts in this period: a torque acts `delay` periods after the status that it
+  /// Returns the torque of this period: a command acts `delay` periods after the status that it
   /// answers.
   JointVector torque(std::int64_t utime);
   JointVector torque_of_iiwa(bool counts) const;
-  /// Through the Panda's low-pass and rate limit.
+  /// Returns the torque behind the Panda's low-pass and rate limit.
   JointVector filtered(const JointVector& torque);
   /// Returns the torque of a driver without commands: it holds, or damps.
   JointVector resting_torque();
@@ -67,8 +67,8 @@ class FakeDriver {
   std::int64_t arrived_ = 0;              ///< when the command did, us
   std::int64_t first_ = 0;                ///< utime of the first status
   std::optional<JointVector> held_;       ///< the position that the PD holds
-  JointVector spring_rest_;               ///< to which springs of KUKA's pull
-  std::deque<JointVector> due_;           ///< torques that are to act
+  JointVector spring_rest_;               ///< where KUKA's springs are fixed
+  std::deque<JointVector> due_;           ///< torques that will act
   JointVector last_torque_;               ///< of the Panda's low-pass
   JointVector last_position_, velocity_;  ///< through the iiwa's low-pass
   std::int64_t statuses_ = 0, commands_ = 0, uncommanded_ = 0;

@@ -41,7 +41,7 @@ std::int64_t fake_utime() {
 struct CommandInbox {
   FakeDriver& driver;
   std::int64_t now = 0;        ///< us
-  std::exception_ptr failure;  ///< LCM, which is C, must not see it
+  std::exception_ptr failure;  ///< must not pass through LCM, which is C
   void take(const lcm::ReceiveBuffer* buffer, const std::string&) noexcept {
     try {
       driver.take(buffer->data, buffer->data_size, now);
@@ -72,7 +72,7 @@ class Pace {
   timespec deadline_{};
 };
 
-/// Publishes a status, or what the trouble makes of it.
+/// Publishes a status as the trouble changes it.
 class StatusOutlet {
  public:
   StatusOutlet(lcm::LCM& bus, lcmtypes::DriverKind kind, const FakeOptions& options)
@@ -132,7 +132,7 @@ void fake_driver(const FakeOptions& options) {
   bus->subscribe(lcmtypes::profile_of(kind).command_channel, &CommandInbox::take, &inbox);
   StatusOutlet outlet(*bus, kind, options);
   const StopSignal stop;
-  // In lock-step no time of day, because it is not kept.
+  // In lock-step not the time of day, because a period may take longer.
   const std::int64_t start = options.lock_step ? 1'000'000 : fake_utime();
   Pace pace(driver.period());
   int patience = kPatience;
@@ -145,7 +145,7 @@ void fake_driver(const FakeOptions& options) {
     if (options.trouble == Trouble::kDie && driver.time() >= options.from) {
       throw std::runtime_error("died, as asked for");
     }
-    // In lock-step a period takes as long as its answer: the clock is that of the simulation.
+    // In lock-step a period takes as long as its answer, so the clock shows simulated time.
     const auto simulated = static_cast<std::int64_t>(std::llround(1e6 * driver.time()));
     inbox.now = options.lock_step ? start + simulated : fake_utime();
     driver.step(inbox.now);
@@ -155,7 +155,7 @@ void fake_driver(const FakeOptions& options) {
       bus->handleTimeout(kTry);
       if (StopSignal::given()) break;
     }
-    patience = driver.commands() == answered ? 1 : kPatience;  // who is silent may stay so
+    patience = driver.commands() == answered ? 1 : kPatience;  // silent: may stay so
   }
   print("statuses: " + std::to_string(driver.statuses()) +
         ", commands: " + std::to_string(driver.commands()) +
@@ -175,7 +175,7 @@ void add_fake_driver(CLI::App& program) {
   command->add_flag("--panda", options->panda, "As drake-franka-driver")->excludes(iiwa);
   command
       ->add_option("--lcm-url", options->url,
-                   "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")
+                   "Bus; by default LCM_DEFAULT_URL, or multicast within this machine")
       ->option_text("URL");
   command->add_flag("--lock-step", options->lock_step,
                     "After the first command, each period waits for its answer, for a second at "

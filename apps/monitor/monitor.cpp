@@ -64,7 +64,7 @@ class Display {
   double line_at_ = 0;  // s, of the view's time
 };
 
-/// Opens what the user has named; a failure is bad input.
+/// Calls `open`; a failure is bad input.
 template <class Open>
 auto open_input(const std::string& option, const Open& open) {
   try {
@@ -78,10 +78,10 @@ auto open_input(const std::string& option, const Open& open) {
 void check_log(const std::string& path) {
   std::error_code unknown;
   if (std::filesystem::file_size(path, unknown) == 0 && !unknown) return;
-  throw CLI::ValidationError("--log", path + ": is no LCM log");
+  throw CLI::ValidationError("--log", path + ": is not an LCM log");
 }
 
-/// Returns what is wrong with the log, "" if nothing is.
+/// Returns the fault of the log, "" if it has none.
 std::string watch_log(const Options& options, MonitorView& view,
                       lcmtypes::MessageHandlers& handlers) {
   const auto reader = open_input(
@@ -162,7 +162,7 @@ void add_monitor(CLI::App& program) {
   CLI::Option* url =
       command
           ->add_option("--lcm-url", options->url,
-                       "Bus to listen to; otherwise that of LCM_DEFAULT_URL, or multicast within "
+                       "Bus to listen to; by default LCM_DEFAULT_URL, or multicast within "
                        "this machine")
           ->option_text("URL");
   command->add_option("--log", options->log, "LCM log to read instead of a bus")
@@ -177,7 +177,7 @@ void add_monitor(CLI::App& program) {
   CLI::Option* plotjuggler =
       command
           ->add_option("--plotjuggler", options->plotjuggler,
-                       "Send each message as JSON over UDP to this port of 127.0.0.1 besides")
+                       "Also send each message as JSON over UDP to this port of 127.0.0.1")
           ->expected(0, 1)
           ->default_str(std::to_string(PlotJuggler::kPort))
           ->check(CLI::Range(1, 65535))

@@ -46,7 +46,7 @@ std::string solver_text(std::int8_t origin) {
   }
 }
 
-/// Whether the loop is stable, and by how much.
+/// The stability of the loop, and its gain margin.
 std::string verdict(const sampled_modes_t& modes) {
   const auto status = static_cast<analysis::Status>(modes.status);
   if (status != analysis::Status::kOk && status != analysis::Status::kUncertified) {
@@ -65,7 +65,7 @@ constexpr const char* kMixed =
     "more than one loop sends to this bus: what is shown is a mixture; an --lcm-url for each "
     "keeps them apart";
 
-/// a - b; numbers of a hostile sender may be so far apart that it overflows, and wraps around.
+/// a - b, which wraps around on overflow: a hostile sender may send any numbers.
 std::int64_t minus(std::int64_t a, std::int64_t b) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
 }
@@ -85,7 +85,7 @@ std::string place(const double (&p)[3]) {
          text::fixed(p[2], 3) + ") m";
 }
 
-/// Returns what the arm carries, where its tool is, and the damping ratios that are held.
+/// Returns the payload, the place of the tool, and the damping ratios of ratio damping.
 std::string told(const state_t& state) {
   std::string text = "payload " + format_number(state.payload_mass, 4) + " kg";
   if (state.payload_mass != 0) text += place(state.payload_center);
@@ -113,7 +113,7 @@ void MonitorView::note_order(std::int64_t tick) {
   const std::int64_t last = state_->tick;
   const bool returned =
       minus(tick, last) > 1 && tick > left_at_ && minus(tick, left_at_) <= kMostLost;
-  // Two loops in step send every tick twice; one whose controller is not called repeats it on end.
+  // Two loops in step send every tick twice; one whose controller is not called repeats a tick.
   const bool repeated = tick == last;
   const bool in_step = repeated && !repeated_[0] && repeated_[1];
   if (in_step || (left_at_ > last && returned)) ++returns_;
@@ -146,7 +146,7 @@ void MonitorView::take(const state_t& message) {
 
 void MonitorView::take(const modes_t& message) {
   note_time(message.utime);
-  constexpr std::int64_t kFarthest = 1'000'000'000;  // that a sequence may jump
+  constexpr std::int64_t kFarthest = 1'000'000'000;  // a larger jump is another sequence
   const std::int64_t gap = modes_ ? minus(message.sequence, modes_->sequence) : 1;
   if (gap > 1 && gap < kFarthest) modes_lost_ += gap - 1;
   ++modes_messages_;
@@ -193,7 +193,7 @@ std::string MonitorView::commands() const {
   const state_t& state = *state_;
   std::string out =
       "  commands: " + verdicts_text(state.verdicts) + "; " +
-      (state.commander == 0 ? "nobody commands"
+      (state.commander == 0 ? "no commander"
                             : "sender " + std::to_string(state.commander) + " commands") +
       "\n";
   if (state.last_refusal == state_t::ACCEPTED) return out;

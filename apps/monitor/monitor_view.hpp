@@ -10,15 +10,15 @@
 
 namespace dashpot::apps {
 
-/// What `dashpot monitor` shows: the last messages, and what they add up to.
+/// What `dashpot monitor` shows: the last messages, and statistics of all.
 class MonitorView {
  public:
   void take(const state_t& message);
   void take(const modes_t& message);
   void take(const sampled_modes_t& message);
 
-  /// Whether states of more than one loop come over the bus. Nothing in a message says who sends
-  /// it: this is concluded from ticks that go back, and then on from where they were.
+  /// Whether states of more than one loop come over the bus. Messages do not name their sender: the
+  /// evidence is ticks that go back, and then on from where they were.
   bool mixed() const { return returns_ > 2; }
   bool empty() const { return !state_ && !modes_ && !sampled_; }
   /// Time of the last message, s since the first one.
@@ -30,7 +30,7 @@ class MonitorView {
   std::string screen(bool bold) const;
   /// Returns the state on one line, ended by a newline.
   std::string line() const;
-  /// Returns what all messages add up to, and the modes at the end; `malformed` were not shown.
+  /// Returns statistics of all messages, and the modes at the end; `malformed` were not shown.
   std::string summary(std::int64_t malformed) const;
 
  private:

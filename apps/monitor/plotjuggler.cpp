@@ -29,7 +29,7 @@ PlotJuggler::~PlotJuggler() {
 }
 
 void PlotJuggler::send(const std::string& text) const {
-  // Whoever does not listen, or is slow, misses something.
+  // A receiver that is slow or missing loses messages.
   (void)::send(socket_, text.data(), text.size(), MSG_DONTWAIT);
 }
 

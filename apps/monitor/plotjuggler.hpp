@@ -7,7 +7,7 @@ namespace dashpot::apps {
 
 /// Sends messages as JSON over UDP to a program on this machine, one datagram each:
 /// {"timestamp": s since 1970-01-01 UTC, "DASHPOT_STATE": {...}}. PlotJuggler's UDP server takes
-/// them with the protocol "json" and the field "timestamp". Nobody has to listen.
+/// them with the protocol "json" and the field "timestamp". The receiver may be absent.
 class PlotJuggler {
  public:
   static constexpr int kPort = 9870;  ///< that PlotJuggler proposes

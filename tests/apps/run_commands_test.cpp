@@ -1,4 +1,4 @@
-// What `dashpot run` says of commands: its option, its limits, and what the monitor shows of them.
+// Commands to `dashpot run`: its option, its limits, and what the monitor shows.
 #include <dashpot/lcmtypes/publish/encode.hpp>
 #include <dashpot/lcmtypes/sink.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
@@ -35,7 +35,7 @@ TEST(RunCommands, AreSaidNotToBeTaken) {
   EXPECT_EQ(result["fault"], nullptr);
 }
 
-/// The complaint about a scene with `limits` under the key `commands`.
+/// The error of a scene with `limits` under the key `commands`.
 std::string complaint_about_limits(const std::string& limits) {
   const Scratch scratch;
   const std::string path =
@@ -111,7 +111,7 @@ TEST(MonitorOfCommands, ShowsFaultCommanderAndVerdicts) {
   write(controller::Status::kOk, 0);
   const std::string calm = run_program({"monitor", "--log", path}).out;
   EXPECT_THAT(calm, Not(HasSubstr("LATCHED")));
-  EXPECT_THAT(calm, HasSubstr("\n  commands: 0 accepted, 0 rejected; nobody commands\n"));
+  EXPECT_THAT(calm, HasSubstr("\n  commands: 0 accepted, 0 rejected; no commander\n"));
   EXPECT_THAT(calm, Not(HasSubstr("last rejected")));
 }
 

@@ -219,8 +219,9 @@ TEST_P(Drive, RefusesALoopThatIsNotTheDrivers) {
   EXPECT_THAT(refusal("robot:\n", "robot:\n  gravity: [0, 0, 9.81]\n"),
               HasSubstr("robot.gravity: is not along -z of the base"));
   EXPECT_THAT(refusal("delay: 1", "delay: 0"), HasSubstr("analysis.sampled.delay: must be"));
-  EXPECT_THAT(refusal(iiwa ? ", difference_velocity: true" : ", cutoff: 27.484 Hz", ""),
-              HasSubstr(iiwa ? "difference_velocity: must be true" : "cutoff: must be that of"));
+  EXPECT_THAT(
+      refusal(iiwa ? ", difference_velocity: true" : ", cutoff: 27.484 Hz", ""),
+      HasSubstr(iiwa ? "difference_velocity: must be true" : "cutoff: must be the cutoff of"));
   // Dampers that are too strong for the wrist are refused before the first torque.
   EXPECT_THAT(refusal("damping_ratio: 0.8", "damping: [20, 20, 10, 10, 20, 10, 4]"),
               HasSubstr("gain margin"));

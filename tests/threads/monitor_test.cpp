@@ -279,7 +279,7 @@ TEST(Monitor, NamesWhatIsWrongWithItsInput) {
                   {
                       {{"--log", "/nonexistent/a.lcm"},
                        "/nonexistent/a.lcm: cannot read the log: No such file or directory"},
-                      {{"--log", text}, "a.txt: is no LCM log"},
+                      {{"--log", text}, "a.txt: is not an LCM log"},
                       {{"--log", scratch.path("")}, "cannot read the log: Is a directory"},
                       {{"--log", ""}, "--log: names no file"},
                       {{"--log", text, "--speed", "nan"}, "--speed"},
