@@ -20,13 +20,13 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using identification::MeasuredMode;
 
-/// A root mean square of differences, in deviations, up to which a model fits: theirs is one, and
-/// an arm is not quite linear.
+/// Largest root mean square of differences, in deviations, with which a model fits: noise alone
+/// gives 1, and an arm is not quite linear.
 constexpr double kFits = 3;
-constexpr double kFar = 2.5;  ///< deviations, beyond which a difference counts by its size
+constexpr double kFar = 2.5;  ///< deviations, beyond which a difference counts linearly
 
-/// Huber's weights: a difference that is far off counts less than by its square, because a mode
-/// that is none must not decide.
+/// Huber's weights: a large difference counts less than by its square, because a spurious mode must
+/// not decide.
 VectorXd robust(const VectorXd& differences) {
   return differences.unaryExpr([](double d) {
     const double size = std::abs(d);
@@ -38,10 +38,10 @@ double root_mean_square(const VectorXd& r) {
   return r.size() > 0 ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0;
 }
 
-/// Parameters by their names, and what they do to a correction. The search has coordinates of its
-/// own, none of which goes below `least()`: of a payload's inertia about x, y and z these are the
-/// sums over its mass of x^2, y^2 and z^2, because an inertia is one of a body just where they are
-/// not negative.
+/// Parameters by their names, and their effect on a correction. The search has coordinates of its
+/// own, which stay above `least()`: for a payload's inertia about x, y and z these are the sums
+/// over its mass of x^2, y^2 and z^2, because a body has an inertia exactly if they are not
+/// negative.
 class Parameters {
  public:
   Parameters(const LoopPrediction& loop, const std::string& names) {
@@ -86,7 +86,7 @@ class Parameters {
         }
       } else {
         throw InputError("--calibrate", "'" + name +
-                                            "' is none of payload, payload_center, "
+                                            "' is unknown; there are payload, payload_center, "
                                             "payload_inertia, reflected_inertia, friction, "
                                             "gear_stiffness, delay");
       }
@@ -132,10 +132,9 @@ class Parameters {
     return result;
   }
 
-  /// The least value of each coordinate: a centre may be anywhere, and gears are never without
-  /// stiffness.
+  /// The least value of each coordinate: a centre may be anywhere, and gears have some stiffness.
   VectorXd least() const {
-    constexpr double kSoftest = 0.05;  // of the stiffness that the configuration has
+    constexpr double kSoftest = 0.05;  // of the stiffness in the configuration
     VectorXd result(size());
     for (std::size_t k = 0; k < list.size(); ++k) {
       result[static_cast<Index>(k)] = list[k].name.starts_with("payload_center") ? -kInfinity
@@ -146,7 +145,7 @@ class Parameters {
   }
 
   std::vector<CalibratedParameter> list;
-  VectorXd prior;  ///< how far a coordinate may be from what the configuration says
+  VectorXd prior;  ///< deviation of a coordinate from the configuration
   VectorXd start;  ///< the coordinates of the configuration
   MatrixXd shown;  ///< coordinates to values
 
@@ -167,8 +166,8 @@ class Parameters {
   std::vector<std::string> kinds_;
 };
 
-/// Differences of measured and predicted numbers in units of their deviations, of which none is
-/// taken to be less than `least`, relative for frequencies.
+/// Differences of measured and predicted numbers in units of their deviations, at least `least`,
+/// relative for frequencies.
 VectorXd differences(const std::vector<PostureReport>& postures,
                      const std::vector<std::vector<PredictedMode>>& predicted, double least) {
   std::vector<double> all;
@@ -179,8 +178,8 @@ VectorXd differences(const std::vector<PostureReport>& postures,
       const MeasuredMode& mode = postures[k].found.modes[static_cast<std::size_t>(number)];
       const PredictedMode& there = predicted[k][i];
       const double w = mode.natural_frequency;
-      // By noise alone: what parts differ by is in the prediction as far as friction and amplitude
-      // are, and the misfit tells the rest.
+      // By noise alone: the scatter between parts is in the prediction as far as friction and
+      // amplitude are, and the misfit shows the rest.
       const double frequency =
           std::max(0.0, std::pow(mode.natural_frequency_std, 2) - mode.frequency_scatter);
       const double ratio = std::max(0.0, std::pow(mode.damping_ratio_std, 2) - mode.ratio_scatter);
@@ -220,8 +219,8 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
       match(postures[k].found.modes, postures[k].predicted);
     }
   };
-  // First of all with large deviations, so that no match that is wrong at the start decides. In the
-  // end nothing is better known than to this: no arm is linear, and at one posture, to less.
+  // Large deviations first, so that no wrong match at the start decides. The last ones are the
+  // least that any number has, because no arm is exactly linear.
   constexpr std::array<double, 5> kLeast = {0.05, 0.01, 2e-3, 5e-4, 1e-4};
   double least = kLeast.back();
   Calibration result;
@@ -287,7 +286,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
     CalibratedParameter& one = parameters.list[static_cast<std::size_t>(i)];
     one.value = values[i];
     one.std = std::sqrt(covariance(i, i));
-    // Deviations say nothing of a parameter that does not fit.
+    // The deviation of a parameter means nothing if the model does not fit.
     one.determined = result.consistent && one.std < 0.2 * parameters.prior[i];
   }
   if (result.consistent && result.misfit >= kFits) {

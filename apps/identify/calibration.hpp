@@ -6,11 +6,11 @@
 
 namespace dashpot::apps {
 
-/// Which change of the parameters called `names` ("payload,reflected_inertia,friction,delay")
-/// explains the differences best: least squares of what was measured at all postures, each number
-/// in units of its deviation, with Huber's weights and within bounds (no mass, inertia, friction or
-/// delay below zero, and no inertia of a payload that no body has). Updates the predictions. Throws
-/// InputError for other names.
+/// Finds the change of the parameters `names` ("payload,reflected_inertia,friction,delay") that
+/// explains the differences best: least squares of the measured numbers at all postures, each in
+/// units of its deviation, with Huber's weights and within bounds (mass, inertia, friction and
+/// delay are not negative, and a body can have the payload's inertia). Updates the predictions.
+/// Throws InputError for other names.
 Calibration calibrate(const LoopPrediction& loop, const std::string& names,
                       std::vector<PostureReport>& postures);
 

@@ -17,14 +17,14 @@ namespace dashpot::apps {
 namespace {
 
 constexpr const char* kNoneBelieved =
-    "none of those found is believed: more pushes, in other directions, or a longer record";
+    "no mode found is believed: record more pushes, in other directions, or a longer record";
 
 constexpr const char* kHelp =
     R"(FILE is an LCM log of `dashpot run` or `dashpot drive`, or a CSV file with a line of names and
 units ("time [s], q1 [rad], ..."). Several files are one experiment. Free decays, after a push, a
 release or a step, are found unless --from or --to says where one is. With --inputs, or a chirp of
-`run --excite` in the log, the motion is what the inputs make of the arm. With --ambient it is that
-of an arm which many small unknown forces shake for a minute or more.
+`run --excite` in the log, the modes come from the response to these inputs. With --ambient they
+come from motion that many small unknown forces cause for a minute or more.
 )";
 
 }  // namespace
@@ -40,16 +40,15 @@ void add_identify(CLI::App& program) {
       ->option_text("NAME,...");
   command
       ->add_option("--rate", options->hints.rate,
-                   "Samples in a second, of files without a column of time")
+                   "Samples in a second, for files without a column of time")
       ->option_text("HZ")
       ->check(CLI::Range(1e-9, 1e9));
   command
       ->add_option("--columns", options->hints.columns,
-                   "Names and units of all columns, of files without a line of them")
+                   "Names and units of all columns, for files without a line of them")
       ->option_text("NAME,...");
-  CLI::Option* ambient =
-      command->add_flag("--ambient", options->ambient,
-                        "The arm is shaken all the time by forces that nobody measured");
+  CLI::Option* ambient = command->add_flag("--ambient", options->ambient,
+                                           "Unmeasured forces shake the arm all the time");
   command
       ->add_option("--inputs", options->inputs,
                    "Columns of what moved the arm from outside: forces, torques, set-points")
@@ -62,11 +61,11 @@ void add_identify(CLI::App& program) {
       ->excludes(ambient);
   command->add_flag(
       "--large-motion", options->large_motion,
-      "Take motion of more than 0.5 rad for linear: where the moved inertia stays, as "
-      "that of a lone joint does");
+      "Treat motion of more than 0.5 rad as linear: right if the moved inertia is constant, "
+      "such as on a lone joint");
   command
       ->add_option("--from", options->from,
-                   "Begin of a free decay, or of what is used, s after the file's first sample")
+                   "Begin of a free decay, or of the part used, s after the file's first sample")
       ->option_text("S");
   command->add_option("--to", options->to, "End of it, s")->option_text("S");
   command
@@ -78,7 +77,7 @@ void add_identify(CLI::App& program) {
   CLI::Option* against =
       command
           ->add_option("--against", options->against,
-                       "Configuration of the controller; its predictions are shown beside")
+                       "Configuration of the controller, whose predicted modes are shown as well")
           ->option_text("CONFIG");
   CLI::Option* calibrated =
       command
@@ -87,7 +86,8 @@ void add_identify(CLI::App& program) {
                        "reflected_inertia, friction, gear_stiffness, delay: those named")
           ->option_text("NAME,...")
           ->needs(against);
-  command->add_option("--output", options->output, "The configuration with what --calibrate found")
+  command
+      ->add_option("--output", options->output, "The configuration with the results of --calibrate")
       ->option_text("CONFIG")
       ->needs(calibrated);
   command

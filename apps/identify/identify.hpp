@@ -9,13 +9,13 @@
 
 namespace dashpot::apps {
 
-/// What a loop was told to add to the tip's wrench while it made a log.
+/// The excitation that a loop added to the tip's wrench while it made a log.
 struct LogExcitation {
   bool chirp = false;
   std::function<controller::Vector6(double)> wrench;  ///< at a time from the first tick, s
 };
 
-/// What `dashpot identify` is asked for.
+/// The options of `dashpot identify`.
 struct IdentifyCommand {
   std::vector<std::string> files;
   std::string channels, inputs, against, calibrate, output, plot;
@@ -24,18 +24,18 @@ struct IdentifyCommand {
   int order = 0;
   bool ambient = false;
   bool excited = false;
-  bool large_motion = false;  ///< is taken for linear
+  bool large_motion = false;  ///< large motion is treated as linear
   bool json = false;
   std::optional<LogExcitation> excitation = {};
-  /// Told the share that is done; true ends the search with what there is.
+  /// Called with the share that is done; true ends the search with the results so far.
   std::function<bool(double)> stop = {};
 };
 
 /// Throws controller::InputError.
 IdentifyReport identify_files(const IdentifyCommand& command);
 
-/// The modes that an LCM log shows of an arm that was excited, beside those that a configuration
-/// predicts. Where that fails, a note in the report says why.
+/// The modes in an LCM log of an excited arm, beside the modes that a configuration predicts. If it
+/// fails, a note in the report says why.
 IdentifyReport identify_log(const std::string& log, const std::string& config,
                             const LogExcitation& excitation);
 

@@ -12,7 +12,7 @@ void draw_identification(const std::string& path, const IdentifyReport& report) 
   if (report.postures.empty()) throw std::runtime_error("--plot: there is nothing to draw");
   const PostureReport& posture = report.postures.front();
   constexpr double kHertz = 1 / (2 * std::numbers::pi);
-  // What was measured fills the picture; what is predicted far from it is left out.
+  // The measured modes fill the picture; predictions far from them are left out.
   double most = 0, largest_ratio = 1;
   for (const identification::MeasuredMode& mode : posture.found.modes) {
     most = std::max(most, 2 * kHertz * mode.natural_frequency);

@@ -19,23 +19,23 @@ using identification::MotionRecord;
 
 /// Rest positions that are closer belong to one posture, rad or m.
 constexpr double kSamePosture = 0.02;
-/// A linear model has to explain this much of a large motion to be believed.
+/// A linear model is believed if it explains this share of a large motion.
 constexpr double kExplains = 0.999;
-constexpr double kFades = 0.5;  // and some mode has to lose so much, as an exponent
+constexpr double kFades = 0.5;  // and if some mode decays by exp(-kFades)
 
 constexpr const char* kNotLinear =
-    "most of what explains the motion is no mode, as where joints rub, reach a limit or touch "
-    "something: larger pushes or a measured excitation (--inputs) tell more, and dashpot calibrate "
+    "most of the motion is not explained by modes, as if joints rub, reach a limit or touch "
+    "something: larger pushes or a measured excitation (--inputs) show more, and dashpot calibrate "
     "finds rotors and friction from torques, and the modes that follow";
 
-/// Whether no more modes are rejected as what is not linear than are believed.
+/// True if at most as many modes are rejected as not linear as are believed.
 bool is_linear(const identification::Identification& found) {
   const auto doubted = std::count_if(found.rejected.begin(), found.rejected.end(),
                                      [](const auto& mode) { return mode.not_linear; });
   return static_cast<std::size_t>(doubted) <= found.modes.size();
 }
 
-/// Returns what was wrong, without the name of the call in front.
+/// Returns the message without the name of the call in front.
 std::string reason_of(const std::invalid_argument& error) {
   constexpr std::string_view kCall = "identify: ";
   std::string text = error.what();
@@ -101,7 +101,7 @@ class Task {
       if (parts_.large) report_.kind = MotionKind::kLargeMotion, report_.advice = kLargeAdvice;
     }
     std::size_t silent = 0;  // postures without modes, because the motion is not linear
-    bool bent = false;       // one with modes
+    bool bent = false;       // one of them has modes
     identification::IdentifyOptions options;
     options.max_order = command_.order;
     const std::vector<std::vector<std::size_t>> groups = by_posture();
@@ -139,8 +139,8 @@ class Task {
         if (report_.advice.empty()) report_.advice = reason_of(error);
         continue;
       }
-      // A linear model does not tell what is far from linear, however good it looks; with more
-      // modes than joints it is none.
+      // A linear model cannot show that a motion is far from linear, however good it looks; with
+      // more modes than joints it does not describe the arm.
       const bool large = std::any_of(group.begin(), group.end(), [this](std::size_t i) {
         return is_large(parts_.list[i].record, report_.channels);
       });

@@ -43,7 +43,7 @@ std::string shape_text(const Eigen::VectorXcd& shape, const std::vector<MotionCh
   return text;
 }
 
-/// A part of the files, by what they show.
+/// The name of a part, by the kind of motion.
 std::string kind_text(MotionKind kind) {
   return kind == MotionKind::kDriven    ? "driven record"
          : kind == MotionKind::kAmbient ? "ambient record"

@@ -15,7 +15,7 @@ struct PredictedMode {
   double natural_frequency = 0;  ///< rad/s
   double damping_ratio = 0;
   Eigen::VectorXcd shape;  ///< joints
-  /// The measured mode that it is, by number in Identification::modes; -1: none.
+  /// Index of the measured mode in Identification::modes; -1: none.
   int measured = -1;
   double likeness = 0;  ///< of the shapes, modal assurance criterion, 0 to 1
 };
@@ -24,11 +24,11 @@ struct PredictedMode {
 struct PartReport {
   std::string file;
   double from = 0, to = 0;  ///< s, of the file's time
-  int posture = -1;         ///< number of PostureReport; -1: of no use
-  std::string reason;       ///< why it is of no use
+  int posture = -1;         ///< number of PostureReport; -1: unused
+  std::string reason;       ///< why it is unused
 };
 
-/// What the parts at one posture say.
+/// The results of the parts at one posture.
 struct PostureReport {
   Eigen::VectorXd rest;  ///< means of the channels where decays end, or of all ambient motion
   int parts = 0;
@@ -36,7 +36,7 @@ struct PostureReport {
   std::vector<PredictedMode> predicted;
 };
 
-/// By how much an arm differs from its model.
+/// The differences between an arm and its model.
 struct ModelCorrection {
   double payload = 0;                                 ///< mass added to the payload, kg
   Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< by which its centre moves, m
@@ -51,7 +51,7 @@ struct ModelCorrection {
 struct CalibratedParameter {
   std::string name, unit;
   double before = 0, value = 0, std = 0;
-  bool determined = false;  ///< the records narrow it down
+  bool determined = false;  ///< by the records
 };
 
 struct Calibration {
@@ -60,14 +60,14 @@ struct Calibration {
   double misfit_before = 0, misfit = 0;  ///< root mean square of the differences, in deviations
   int numbers = 0;                       ///< frequencies and ratios that were explained
   bool consistent = false;               ///< the misfit is one that the deviations explain
-  std::vector<std::string> warnings;     ///< what the records cannot tell apart
+  std::vector<std::string> warnings;     ///< parameters that the records cannot separate
 };
 
 struct IdentifyReport {
-  std::vector<MotionChannel> channels;  ///< those that are used
-  /// What the records show; those of another kind are left out.
+  std::vector<MotionChannel> channels;  ///< channels used
+  /// What the records show; records of another kind are left out.
   identification::MotionKind kind = identification::MotionKind::kNothing;
-  std::string advice;  ///< where no modes can be told: why, and what would tell them
+  std::string advice;  ///< if no modes can be identified: why, and what would help
   std::vector<PartReport> parts;
   std::vector<PostureReport> postures;  ///< by falling number of parts
   std::vector<std::string> notes;

@@ -27,7 +27,7 @@ JointVector sum_of(const JointVector& before, const VectorXd& added, Index n) {
   return sum;
 }
 
-/// Returns what the robot's file and configuration say of its joints.
+/// Returns the joint friction in the robot's file and configuration.
 JointVector joint_friction(const controller::Config& config) {
   return config.model.joint_values(&controller::Joint::viscous_friction);
 }
@@ -82,7 +82,7 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
                                                               const ModelCorrection& correction,
                                                               int delay) const {
   const controller::Settings& settings = config_.settings;
-  controller::RobotDescription rigid = config_.robot;  // what the controller feeds back
+  controller::RobotDescription rigid = config_.robot;  // the model in the controller's law
   rigid.options.gear_stiffness.resize(0);
   const bool elastic = config_.model.elastic_joints() > 0;
   controller::PostureLoop believed(elastic ? rigid.model() : config_.model, settings);
@@ -100,7 +100,7 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
   analysis::SampledLoop sampled =
       arm.at(q, &outside, controller::integral_stiffness(at, springs, timing.integral_time));
   if (!timing.ideal_gravity && (correction.payload != 0 || !correction.center.isZero(0))) {
-    const MatrixXd added =  // whose weight nobody holds
+    const MatrixXd added =  // weight without compensation
         sampled.gravity_gradient -
         controller::gravity_gradient(controller::DynamicsKernel(config_.model), q);
     system.stiffness += (added + added.transpose()) / 2;
@@ -135,7 +135,7 @@ std::vector<PredictedMode> LoopPrediction::predict(const VectorXd& rest,
   const int ticks = static_cast<int>(std::floor(delay));
   std::vector<PredictedMode> modes = predict_with_delay(q, correction, ticks);
   const double share = delay - ticks;
-  if (share > 0) {  // between two ticks: on the line between both
+  if (share > 0) {  // between two ticks: linear interpolation
     const std::vector<PredictedMode> later = predict_with_delay(q, correction, ticks + 1);
     for (std::size_t i = 0; i < modes.size() && i < later.size(); ++i) {
       modes[i].natural_frequency +=
@@ -160,7 +160,7 @@ void LoopPrediction::write(const std::string& path, const ModelCorrection& corre
       if (std::isfinite(value)) {
         node.push_back(value);
       } else {
-        node.push_back("none");  // of gears that do not bend
+        node.push_back("none");  // rigid gears
       }
     }
     return node;

@@ -7,7 +7,7 @@
 
 namespace dashpot::apps {
 
-/// What a configuration predicts for the loop as it runs, with an arm that differs from its model.
+/// Predicts the modes of a configuration's loop with an arm that differs from its model.
 class LoopPrediction {
  public:
   /// Reads the configuration. The channels have to be all joint positions, "q1" ... in any order,
@@ -16,9 +16,9 @@ class LoopPrediction {
 
   int dof() const { return config_.model.dof(); }
 
-  /// The modes with the channels at `rest`: of the loop sampled, delayed and filtered as the
-  /// configuration says (analysis.sampled), by falling frequency. The gains are those of the
-  /// configuration, with the model that the controller has; the arm moves as `correction` says.
+  /// The modes with the channels at `rest`, by falling frequency. The loop is sampled, delayed and
+  /// filtered as the configuration says (analysis.sampled), and has its gains and the controller's
+  /// model; the arm has the `correction`.
   std::vector<PredictedMode> predict(const Eigen::VectorXd& rest,
                                      const ModelCorrection& correction) const;
 

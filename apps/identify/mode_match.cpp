@@ -16,12 +16,12 @@ double likeness(const Eigen::VectorXcd& u, const Eigen::VectorXcd& v) {
   return std::norm(u.dot(v)) / std::max(1e-300, u.squaredNorm() * v.squaredNorm());
 }
 
-/// The eigenvalue of an underdamped mode; of others a point that is as far on the axis.
+/// The eigenvalue of an underdamped mode; for other modes a point of equal size on the real axis.
 Complex eigenvalue(double frequency, double ratio) {
   return frequency * Complex(-ratio, std::sqrt(std::max(0.0, 1 - ratio * ratio)));
 }
 
-/// How unlike a measured and a predicted mode are; infinite if they cannot be one.
+/// The distance between a measured and a predicted mode; infinite if they cannot be the same.
 double unlikeness(const MeasuredMode& measured, const PredictedMode& predicted, double alike) {
   const Complex a = eigenvalue(measured.natural_frequency, measured.damping_ratio);
   const Complex b = eigenvalue(predicted.natural_frequency, predicted.damping_ratio);
@@ -30,7 +30,7 @@ double unlikeness(const MeasuredMode& measured, const PredictedMode& predicted, 
   return distance + (1 - alike);
 }
 
-constexpr double kFarthest = 0.9;  // above the largest unlikeness of two that can be one
+constexpr double kFarthest = 0.9;  // above the largest finite unlikeness
 
 }  // namespace
 
@@ -64,7 +64,7 @@ void put_in_order(const std::vector<PredictedMode>& others, std::vector<Predicte
     }
   }
   const std::vector<int> place = nearest_pairs(apart, 2);
-  if (std::find(place.begin(), place.end(), -1) != place.end()) return;  // shapes are no numbers
+  if (std::find(place.begin(), place.end(), -1) != place.end()) return;  // shapes have NaN
   std::vector<PredictedMode> ordered(modes.size());
   for (std::size_t i = 0; i < modes.size(); ++i) {
     ordered[static_cast<std::size_t>(place[i])] = std::move(modes[i]);

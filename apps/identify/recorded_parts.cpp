@@ -19,13 +19,13 @@ using identification::MotionKind;
 using identification::MotionRecord;
 
 /// Motion over more than this is large, rad: the inertia that a joint sees changes by about as
-/// large a share with the posture. Of a linear motion, whose scale is free, the fit tells.
+/// large a share with the posture. The scale of a linear motion is free; the fit judges it.
 constexpr double kLargeRange = 0.5;
-/// A cycle with a larger share at multiples of its frequency is a trajectory, if it is large.
+/// A large cycle with a larger share at multiples of its frequency is a trajectory.
 constexpr double kCycleHarmonics = 0.1;
 constexpr Index kMoment = 100;  // samples
-/// The share of the samples at which the wrench of an excitation changes, from which on the motion
-/// is read as the wrench's, and not as the free decays that follow.
+/// If the wrench of an excitation changes at a larger share of the samples, the motion counts as
+/// the response to it, and not as the free decays that follow.
 constexpr double kMuchChanges = 0.2;
 
 /// Means of the last samples.
@@ -44,8 +44,8 @@ Eigen::VectorXd rest_of(const MotionRecord& record, Index last) {
   return rest;
 }
 
-/// Samples at a channel's end of range, where it stays for some and comes and goes at once, are
-/// those of a sensor that saturates: they become missing. Returns how many.
+/// Marks samples of a saturated sensor as missing: the channel stays at the end of its range for
+/// some samples, and comes and goes at once. Returns how many.
 int leave_out_clipped(Eigen::MatrixXd& values, Index channel) {
   constexpr Index kRun = 3;     // samples
   constexpr double kSteps = 3;  // times the least step of the channel: rounding stays as well
@@ -73,8 +73,8 @@ int leave_out_clipped(Eigen::MatrixXd& values, Index channel) {
   return count;
 }
 
-/// Says which columns of a file may be inputs that nobody named: forces, and torques that are fewer
-/// than the joints, because a torque of each joint is the controller's.
+/// Names the columns of a file that may be inputs although --inputs does not list them: forces, and
+/// torques if they are fewer than the joints, because a torque of each joint is the controller's.
 std::vector<std::string> possible_inputs(const std::vector<MotionChannel>& channels,
                                          const std::vector<Index>& chosen) {
   const auto torques = std::count_if(channels.begin(), channels.end(),
@@ -117,7 +117,7 @@ class PartsReader {
                            report_.channels.end(), [](const auto& a, const auto& b) {
                              return a.name == b.name && a.unit == b.unit;
                            })) {
-      throw InputError(path, "its channels differ from those of " + command_.files.front());
+      throw InputError(path, "its channels differ from the channels of " + command_.files.front());
     }
     const auto say = [this, &name](const std::vector<std::string>& notes) {
       for (const std::string& note : notes) {
@@ -165,7 +165,7 @@ class PartsReader {
       leave_out(chosen_part, name, report_.advice);
     } else if (kind != MotionKind::kDecays) {
       add_stretches(all, first, last, kind == MotionKind::kAmbient ? file.free : file.rests, name);
-    } else if (command_.from || command_.to) {  // the user says what is free
+    } else if (command_.from || command_.to) {  // the user names the free decay
       add(chosen_part, name);
     } else {
       for (const identification::FreeDecay& found : identification::find_decays(all, file.free)) {
@@ -189,7 +189,7 @@ class PartsReader {
         {file, record.time[0], record.time[record.time.size() - 1], -1, reason});
   }
 
-  /// Returns what a record shows; where that has no modes, the report says why.
+  /// Returns the kind of motion; if that has no modes, the report says why.
   MotionKind kind_of(const MotionRecord& record, bool driven, const std::vector<bool>& free) {
     const identification::MotionVerdict verdict = identification::judge_motion(record);
     const bool large = !command_.large_motion && is_large(record, report_.channels);
@@ -208,7 +208,7 @@ class PartsReader {
     }
     if (kind == MotionKind::kAmbient && !command_.ambient &&
         std::find(free.begin(), free.end(), false) != free.end()) {
-      kind = MotionKind::kDecays;  // of a log whose reference moves
+      kind = MotionKind::kDecays;  // a log with a moving reference
     }
     if (kind == MotionKind::kAmbient && large) kind = MotionKind::kLargeMotion;
     if (kind == MotionKind::kLimitCycle) {
@@ -235,7 +235,7 @@ class PartsReader {
     return driving;
   }
 
-  /// Whether the user, or a wrench in the file, says that what moved the arm is known.
+  /// True if, by the options or the wrench in the file, the input that moved the arm is known.
   bool is_driven(const MotionFile& file, const std::vector<Index>& driving) const {
     const bool known = file.wrench || command_.excitation;
     if (command_.excited && command_.inputs.empty() && !known) {
@@ -260,13 +260,13 @@ class PartsReader {
     return !command_.ambient && (command_.excited || !command_.inputs.empty() || much);
   }
 
-  /// inputs x samples; what is missing holds its last value.
+  /// inputs x samples; a missing value is replaced by the last one.
   Eigen::MatrixXd inputs_of(const MotionFile& file, const std::vector<Index>& driving) {
     Eigen::MatrixXd inputs(static_cast<Index>(driving.size()), file.time.size());
     for (std::size_t i = 0; i < driving.size(); ++i) {
       inputs.row(static_cast<Index>(i)) = file.values.row(driving[i]);
     }
-    if (!file.wrench && command_.inputs.empty()) {  // what the loop was told, from its first tick
+    if (!file.wrench && command_.inputs.empty()) {  // the excitation, from the first tick
       for (Index k = 0; k < file.time.size(); ++k) {
         inputs.col(k) = command_.excitation->wrench(file.time[k]);
       }
@@ -281,8 +281,8 @@ class PartsReader {
     return inputs;
   }
 
-  /// The stretches in which the loop itself moves nothing. A limit that is touched for a moment
-  /// does not end one.
+  /// Adds the stretches in which the loop moves no reference. A limit that is touched for a moment
+  /// does not end a stretch.
   void add_stretches(const MotionRecord& all, Index first, Index last,
                      const std::vector<bool>& free, const std::string& file) {
     constexpr Index kShortest = 20;  // samples

@@ -82,7 +82,7 @@ const char* to_text(controller::JointType type) {
   return "";
 }
 
-/// Returns what the file says of the joints; null where it sets no limit.
+/// Returns the joints of the file; null for a limit that it does not set.
 Json json_joints(const RobotModel& model) {
   Json list = Json::array();
   const auto limit = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };
@@ -198,7 +198,7 @@ std::string tip_table(const DynamicsResult& dynamics) {
   return table.text();
 }
 
-/// Returns what is known of the rotors, and from where.
+/// Returns the source and figures of the rotors, and which are unknown.
 std::string rotors_text(const InspectOptions& options, const RobotModel& model) {
   std::string text;
   if (!options.drives.empty()) {
@@ -225,13 +225,13 @@ std::string rotors_text(const InspectOptions& options, const RobotModel& model) 
   const std::string missing = controller::missing_rotors_text(model);
   if (missing.empty()) return text;
   return text + "\nRotors unknown: " + missing +
-         ".\nThe mass matrix is that of an arm without them; they resist wrists most.\n" +
+         ".\nThe mass matrix is computed without them; they matter most at the wrist.\n" +
          controller::rotors_hint(model, "--reflected-inertia", "--drives", "\n") + "\n";
 }
 
 std::string stop_table(const RobotModel& model, const JointVector& q) {
   const controller::Settings settings = controller::default_settings(model);
-  if (settings.limits.torque.isZero(0)) return "";  // nobody knows
+  if (settings.limits.torque.isZero(0)) return "";  // unknown
   const Stopping stops = controller::stopping(model, settings, q);
   Eigen::MatrixXd rows(2, model.dof());
   rows << stops.time.transpose(), stops.way.transpose();
@@ -287,12 +287,12 @@ void add_inspect(CLI::App& program) {
       ->required();
   add("--tip", &InspectOptions::tip, "Link at the end of the chain", "LINK")->required();
   options->posture.add(*command);
-  options->posture.refused = std::numbers::pi;  // its numbers hold beyond the limits, too
+  options->posture.refused = std::numbers::pi;  // the results hold beyond the limits, too
   add("--qd", &InspectOptions::qd, "Joint velocities, rad/s or m/s", "a,b,... (0)");
   add("--gravity", &InspectOptions::gravity, "In axes of the file's root link, m/s^2",
       "x,y,z (0,0,-9.81)");
   add("--reflected-inertia", &InspectOptions::reflected_inertia,
-      "Of rotors and gears at the joints, kg m^2 or kg; one number is that of all joints",
+      "Inertia of rotors and gears at the joints, kg m^2 or kg; one number for all, or n",
       "a,b,... (0)");
   add("--drives", &InspectOptions::drives, kDrivesHelp, "NAME")->check(not_empty());
   add_gear_options(*command, options->gears);

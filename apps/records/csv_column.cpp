@@ -30,7 +30,7 @@ struct Conversion {
   double factor;
 };
 
-/// The SI unit that `unit` converts to, where it is written as usual.
+/// The SI unit that `unit` converts to, if it is written as usual.
 std::optional<Conversion> to_si_as_written(std::string unit) {
   for (const auto& [name, usual] :
        {std::pair("sec", "s"), std::pair("seconds", "s"), std::pair("msec", "ms"),
@@ -51,14 +51,14 @@ std::optional<Conversion> to_si_as_written(std::string unit) {
   return std::nullopt;
 }
 
-/// The SI unit that `unit` converts to, in any case where that is clear: M is not m.
+/// The SI unit that `unit` converts to, in any letter case that is unambiguous: M is not m.
 std::optional<Conversion> to_si(const std::string& unit) {
   std::optional<Conversion> found = to_si_as_written(unit);
   if (found || unit.size() < 3 || unit.front() == 'M') return found;
   return to_si_as_written(lower(unit));
 }
 
-/// Returns what a name without a unit is measured in, by its words.
+/// Returns the usual unit for a name without a unit, by its words.
 std::string usual_unit(const std::string& name) {
   const std::vector<std::string> words = words_of(name);
   if (words.empty() || has_any(words, {"tip", "tcp", "ee", "pose", "cartesian", "wrench", "force",
@@ -138,7 +138,7 @@ bool is_desired(const std::string& name) {
 
 bool set_unit(const std::string& unit, CsvColumn& column) {
   const std::optional<Conversion> conversion = to_si(unit);
-  // Another unit than a motion's matters only to those who want the column, and stays as it is.
+  // A unit of other quantities is kept: it matters only if the column is asked for.
   column.unit = conversion ? conversion->unit : unit;
   column.factor = conversion ? conversion->factor : 1;
   return conversion.has_value();

@@ -14,7 +14,7 @@ namespace {
 
 using controller::InputError;
 
-/// A file without a time lacks this.
+/// The error of a file without a time.
 constexpr const char* kNoTime =
     "no column of time (t, time, timestamp, stamp, date, utime, duration or elapsed): --rate HZ, "
     "or --columns with a name for each column";
@@ -46,7 +46,7 @@ class CsvReader {
     }
     if (columns_.empty() && names_line_ > 0) read_names(names_);
     if (columns_.empty()) throw InputError("", "is empty");
-    if (rows_.size() < Rows::kLeast) {  // the reason may be that they are no numbers
+    if (rows_.size() < Rows::kLeast) {  // perhaps because cells are not numbers
       for (const MotionChannel& channel : file_.channels) {
         if (!channel.problem.empty()) throw InputError("", channel.problem);
       }
@@ -68,7 +68,7 @@ class CsvReader {
     return row;
   }
 
-  /// A line that may have the names, if the next one has numbers.
+  /// Keeps a line that may have the names, if the next one has numbers.
   void keep_names(std::string_view row, bool comment) {
     names_ = row;
     names_line_ = line_;
@@ -86,7 +86,8 @@ class CsvReader {
       }
     } else if (!numbers) {
       keep_names(row, false);
-      // Rows may begin with text, where the names are clear; else more lines may come before them.
+      // If the names are clear, rows may begin with text; otherwise more lines may come before
+      // them.
       if (hints_.rate > 0 || has_time(cells)) read_names(row);
       return;
     } else if (names_line_ > 0 &&
@@ -127,8 +128,8 @@ class CsvReader {
     }
   }
 
-  /// Columns of a file without names: the first one is the time if it rises evenly, and, where
-  /// there is a rate, to the end of the file.
+  /// Columns of a file without names: the first one is the time if it rises evenly and, with a
+  /// rate, to the end of the file.
   void number_columns(std::string_view row) {
     constexpr std::size_t kEven = 20;  // samples
     separator_ = separator_of(row);
@@ -226,24 +227,24 @@ class CsvReader {
     return any;
   }
 
-  /// The sample of a channel. What is no number matters only to those who want the channel.
+  /// The sample of a channel. Text is an error only if the channel is used.
   double read_value(std::string_view cell, const CsvColumn& column) {
     if (const std::optional<double> value = read_number(cell)) return *value * column.factor;
     MotionChannel& channel = file_.channels[values_.size()];
     if (channel.problem.empty()) {
       channel.problem = "line " + std::to_string(line_) + ", " + column.name + ": '" +
-                        std::string(trimmed(cell).substr(0, 40)) + "' is no number";
+                        std::string(trimmed(cell).substr(0, 40)) + "' is not a number";
     }
     return kMissing;
   }
 
-  /// A time of which neither part loses digits.
+  /// A time in two parts, so that no digits are lost.
   struct Stamp {
     std::int64_t whole = 0;
     double fraction = 0;
   };
 
-  /// From the digits of `text`; from `value` where it is a date or has an exponent.
+  /// From the digits of `text`; from `value` if it is a date or has an exponent.
   static Stamp stamp_of(std::string_view text, double value) {
     constexpr auto kFixed = std::chars_format::fixed;
     Stamp stamp;
@@ -255,16 +256,16 @@ class CsvReader {
     return stamp;
   }
 
-  /// From the first stamp. Whole units and fractions are subtracted apart, so that large numbers
-  /// lose no digits.
+  /// Time since the first stamp. Whole units and fractions are subtracted separately, so that large
+  /// numbers lose no digits.
   double read_time(std::string_view cell, CsvColumn& column) {
     const std::string_view text = trimmed(cell);
     const std::optional<double> date = read_date(text), value = date ? date : read_number(text);
     if (!value) {
       throw InputError("", "line " + std::to_string(line_) + ", " + column.name + ": '" +
                                std::string(text.substr(0, 40)) +
-                               "' is no time, a number or 2026-01-31T12:00:00.5Z: --rate HZ stands "
-                               "for one");
+                               "' is not a time, which is a number or 2026-01-31T12:00:00.5Z: "
+                               "--rate HZ replaces the column");
     }
     if (date) column.guessed = false;
     constexpr double kMost = 9e18;  // what an int64 holds
@@ -291,8 +292,8 @@ class CsvReader {
     if (file_.channels.empty()) throw InputError("", "no column of numbers but the time");
   }
 
-  /// A time without a unit whose steps are no seconds is in ms, us or ns. One with a unit is asked
-  /// about where its steps are hardly those of a record.
+  /// A time without a unit is in ms, us or ns if its steps are too large for s. For a time with a
+  /// unit and unlikely steps, a note asks for the unit.
   void scale_time() {
     const auto column = std::find_if(columns_.begin(), columns_.end(),
                                      [](const CsvColumn& one) { return one.time; });
@@ -314,7 +315,7 @@ class CsvReader {
            << (step < kSlowest          ? "s"
                : step < 1000 * kSlowest ? "ms"
                                         : "us")
-           << "? Frequencies are others then";
+           << "? Then the frequencies are wrong";
       file_.notes.push_back(text.str());
       return;
     }
@@ -336,7 +337,7 @@ class CsvReader {
   Rows rows_{file_};
   std::vector<CsvColumn> columns_;
   std::vector<double> values_;
-  std::string_view rest_;   ///< what was not read yet
+  std::string_view rest_;   ///< unread text
   std::string_view names_;  ///< the last line that may have the names
   std::size_t names_line_ = 0;
   bool comment_ = false;  ///< it is one

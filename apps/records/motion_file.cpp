@@ -58,16 +58,16 @@ MotionFile read_log(const std::string& path) {
                        state.reference_tip_quaternion + 4);
     }
     const std::size_t size = reference.size();
-    if (joint) {  // where the wrench is feed-forward alone, such as an excitation
+    if (joint) {  // the wrench is feed-forward alone, such as an excitation
       reference.insert(reference.end(), state.tip_wrench, state.tip_wrench + 6);
     }
-    // What a reference does without end, closer than this, moves nothing that can be seen.
+    // Smaller changes of a reference, such as its endless approach to a goal, move nothing visible.
     std::size_t kept = 0;
     while (reference.size() == reference_before.size() && kept < reference.size() &&
            std::abs(reference[kept] - reference_before[kept]) < 1e-9) {
       ++kept;
     }
-    // Springs that have just started grow for a while.
+    // Restarted springs grow for a while.
     constexpr std::int64_t kGrowing = 500'000;  // us
     if (state.restarts != restarts) restarts = state.restarts, restarted = state.utime;
     const bool well = state.status == 0 && state.fault == 0 && state.utime - restarted > kGrowing;
@@ -89,7 +89,7 @@ bool is_log(const std::string& text) {
                     [](unsigned char a, char b) { return a == static_cast<unsigned char>(b); });
 }
 
-/// Whether a file is MCAP, or one of a rosbag's.
+/// Whether a file is MCAP or part of a rosbag.
 bool is_bag(std::string_view text) {
   return text.starts_with("\x89MCAP0\r\n") || text.starts_with("SQLite format 3") ||
          text.starts_with("#ROSBAG");
@@ -158,7 +158,7 @@ std::vector<Index> chosen_channels(const std::vector<MotionChannel>& channels,
       }
     }
   }
-  // The tip follows from the joints, and its columns add nothing but their own curvature.
+  // The tip follows from the joints, and its columns only add the curvature of the kinematics.
   const auto of_tip = [&channels](Index i) {
     return is_of_tip(channels[static_cast<std::size_t>(i)].name);
   };

@@ -9,19 +9,18 @@ namespace dashpot::apps {
 /// ...), or a CSV file: a line of names with units ("q1 [rad]", "q1 (deg)", "q1_deg"; without a
 /// unit q is in rad, qd, dq and v in rad/s, tau and torque in N m, time in s, utime in us), then
 /// numbers between commas, semicolons (with decimal commas, too), tabs or spaces. The names may be
-/// in a comment, as numpy.savetxt writes them, or in `hints`. An empty cell or nan is a sample that
-/// is missing, as is NA or null; columns that begin with text are left out, and text further down
-/// is a `problem` of its channel. One column is the time: t, time, timestamp, stamp, date, utime,
-/// duration or elapsed, in numbers or as 2026-01-31T12:00:00.5Z; where no
-/// unit is given and its steps exceed half a second, it is in ms, us or ns. Of a file without names
-/// a first column that rises evenly is the time. Throws InputError that names the file, the line
-/// and the column.
+/// in a comment, as numpy.savetxt writes them, or in `hints`. An empty cell, nan, NA or null is a
+/// missing sample; columns that begin with text are left out, and text further down is a `problem`
+/// of its channel. One column is the time: t, time, timestamp, stamp, date, utime, duration or
+/// elapsed, in numbers or as 2026-01-31T12:00:00.5Z; without a unit, and with steps over half a
+/// second, it is in ms, us or ns. In a file without names a first column that rises evenly is the
+/// time. Throws InputError with the file, the line and the column.
 MotionFile read_motion_file(const std::string& path, const FileHints& hints = {});
 
-/// Numbers of the channels called `names`, "q1,q2"; of those that are positions, or else
-/// velocities, if that is empty, without those that are desired ("q_d_0", "pos_cmd"), in `others`,
-/// or the tip's beside joints; of a file without names all. No two of one name. Throws InputError
-/// with `option` as key.
+/// Indices of the channels `names`, "q1,q2". If that is empty: of all positions, or otherwise
+/// velocities, except desired ones ("q_d_0", "pos_cmd"), channels in `others`, and the tip's if
+/// there are joints; of all channels without names. No two have one name. Throws InputError with
+/// `option` as key.
 std::vector<Eigen::Index> chosen_channels(const std::vector<MotionChannel>& channels,
                                           const std::string& names,
                                           const std::vector<Eigen::Index>& others = {},

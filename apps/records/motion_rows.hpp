@@ -7,7 +7,7 @@
 
 namespace dashpot::apps {
 
-/// Rows as they come, in one order of time.
+/// Rows of samples, in the order of time.
 class Rows {
  public:
   static constexpr std::size_t kLeast = 20;

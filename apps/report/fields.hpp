@@ -8,7 +8,7 @@
 
 namespace dashpot::apps {
 
-/// How a field stands in a table for people.
+/// The form of a field in a table for people.
 struct TableCell {
   TextTable::Align align = TextTable::Align::kPoint;
   std::vector<std::string> heading;  ///< empty: the field is not in the table
@@ -21,9 +21,9 @@ template <class Record>
 struct Field {
   std::string json = {};  ///< its key; empty: not in JSON
   std::string csv = {};   ///< its heading with the unit; empty: not in CSV
-  TableCell table = {};   ///< where it stands for people
+  TableCell table = {};   ///< its form in tables for people
   std::function<Json(const Record&)> value;
-  std::function<std::string(const Record&)> text = {};  ///< of the table, if not that of the value
+  std::function<std::string(const Record&)> text = {};  ///< of the table, if unlike the value
 };
 
 /// Returns a value as the text of a table.

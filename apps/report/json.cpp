@@ -20,8 +20,8 @@ Json mode_json(const analysis::Mode<>& mode) {
           {"damping_ratio_bound", mode.damping_ratio_bound}};
 }
 
-/// The value on one line, in ASCII: other characters as \u00e9, what is not UTF-8 as \ufffd. Names
-/// of robots and files come from elsewhere, and must neither end the program nor steer a terminal.
+/// The value on one line, in ASCII: other characters as \u00e9, invalid UTF-8 as \ufffd. Names of
+/// robots and files come from elsewhere, and must neither end the program nor steer a terminal.
 std::string one_line(const Json& value) {
   return value.dump(-1, ' ', true, Json::error_handler_t::replace);
 }

@@ -7,7 +7,7 @@
 
 namespace dashpot::apps {
 
-/// Every number of a report can be read back exactly; what is NaN or infinite is null.
+/// Every number of a report can be read back exactly; NaN and infinity are null.
 using Json = nlohmann::ordered_json;
 
 /// Returns [re, im].

@@ -7,7 +7,7 @@
 namespace dashpot::apps {
 
 /// Returns a table of the modes with their shares in a motion and the amplitudes of `point`, and of
-/// what else shares in it.
+/// the other shares.
 std::string shares_table(const analysis::Spectrum<>& spectrum, const analysis::ModeShares& shares,
                          const std::string& point);
 

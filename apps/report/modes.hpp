@@ -10,7 +10,7 @@
 
 namespace dashpot::apps {
 
-/// A mode of a loop as it runs, whoever tells of it.
+/// A mode of a running loop, from the plugin or from a message.
 struct LoopMode {
   int label = 0;
   double natural_frequency = 0, damping_ratio = 0, damped_frequency = 0;  // rad/s, 1, rad/s
@@ -25,7 +25,7 @@ struct LoopMode {
 std::vector<LoopMode> loop_modes(const dashpot_modes& modes);
 std::vector<LoopMode> loop_modes(const modes_t& modes);
 
-/// Where the words of the table stand: those of one line above or below, and the width of shapes.
+/// The layout of the table: headings of one line above or below, and the width of shapes.
 struct ModesTable {
   const char* label = "label";
   bool above = false;
@@ -35,13 +35,12 @@ struct ModesTable {
 /// Returns the fields of such modes in JSON, CSV and the table.
 std::vector<Field<LoopMode>> mode_fields(const ModesTable& table = {});
 
-/// Returns a line that tells at which rates, 1/s, the slow modes decay that an integral of springs
-/// makes;
-/// "" if there are none. `decays` by size.
+/// Returns a line with the decay rates, 1/s, of the slow modes that an integral of the springs
+/// causes; "" if there are none. `decays` by size.
 std::string integral_text(const std::vector<double>& decays);
 
-/// Returns a line that tells what a loop leaves out, see controller::loop_assumptions; "" if it
-/// leaves nothing out.
+/// Returns a line with the assumptions of a loop, see controller::loop_assumptions; "" if there are
+/// none.
 std::string assumes_text(const std::vector<std::string>& names);
 
 }  // namespace dashpot::apps

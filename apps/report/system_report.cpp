@@ -78,15 +78,15 @@ using Align = TextTable::Align;
 constexpr std::size_t kWidth = 100;
 constexpr const char* kShapeHeading = "shape, relative to its largest entry (phase if over 10 deg)";
 
-/// Returns what follows the real part of the first eigenvalue: the imaginary part of a complex
-/// pair, or the second of two real ones.
+/// Returns the number after the real part of the first eigenvalue: the imaginary part of a complex
+/// pair, or the second of two real eigenvalues.
 std::string second_eigenvalue(const analysis::Mode<>& mode) {
   const analysis::Complex first = mode.eigenvalues[0];
   if (first.imag() == 0) return format_number(mode.eigenvalues[1].real(), 6);
   return "+- " + format_number(std::abs(first.imag()), 6) + "i";
 }
 
-/// The bound of both of a complex pair, or of each of two real eigenvalues.
+/// The bound of a complex pair, or the bounds of two real eigenvalues.
 std::string eigenvalue_bounds(const analysis::Mode<>& mode) {
   if (mode.eigenvalues[0].imag() != 0) return format_bound(mode.error_bound);
   return format_bound(mode.eigenvalue_bounds[0]) + " " + format_bound(mode.eigenvalue_bounds[1]);

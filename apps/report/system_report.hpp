@@ -11,7 +11,7 @@
 
 namespace dashpot::apps {
 
-/// Motion at the times asked for: the sum of the responses to all that was given.
+/// Motion at the wanted times: the sum of the responses to all inputs.
 struct ReportedResponse {
   std::vector<double> times;              ///< s
   std::vector<analysis::Motion> motions;  ///< one for each time
@@ -19,16 +19,16 @@ struct ReportedResponse {
   std::string point;                      ///< whose amplitudes these are
 };
 
-/// What `dashpot analyze` says of one system.
+/// The results of `dashpot analyze` for one system.
 struct Report {
   Eigen::Index dof = 0;
   analysis::Spectrum<> spectrum;
-  analysis::RigidBodyElimination elimination;  ///< the paper's reduction, for reading beside it
+  analysis::RigidBodyElimination elimination;  ///< the paper's reduction, for comparison
   std::optional<ReportedResponse> response;
-  std::vector<std::string> notes;  ///< what the reader may not expect, a sentence each
+  std::vector<std::string> notes;  ///< unexpected facts, a sentence each
 };
 
-/// Analyses `system`, which is what `entry` gives in joint space.
+/// Analyses `system`, the system of `entry` in joint space.
 Report make_report(const SystemEntry& entry, const analysis::System<>& system,
                    const analysis::SpectrumOptions& options, analysis::Pivot pivot);
 
@@ -36,8 +36,8 @@ Report make_report(const SystemEntry& entry, const analysis::System<>& system,
 Json report_json(const Report& report);
 /// An object for each report, in a list if `as_list`.
 std::string to_json(const std::vector<Report>& reports, bool as_list);
-/// The reports as text for people, at most 100 columns wide where the numbers allow it. Those of a
-/// list are headed by their index, counted from 0. `bold` marks headings for a terminal.
+/// The reports as text for people, at most 100 columns wide if the numbers allow it. In a list each
+/// report is headed by its index, counted from 0. `bold` marks headings for a terminal.
 std::string to_table(const std::vector<Report>& reports, bool as_list, bool bold);
 
 }  // namespace dashpot::apps

@@ -21,7 +21,7 @@ class TextTable {
     for (const Column& column : columns) add_column(column.align, column.heading);
   }
 
-  /// `heading` has as many lines as that of every other column.
+  /// All columns have equally many lines in `heading`.
   void add_column(Align align, std::vector<std::string> heading);
   void add_row(std::vector<std::string> cells);
   /// Adds a column to all rows. A table is filled by columns or by rows.
@@ -49,8 +49,8 @@ std::string format_bound(double bound);
 /// a deviation that is not finite.
 std::string with_deviation(double value, double deviation);
 
-/// Numbers of one column with as many decimals as give the largest so many significant digits; what
-/// rounds to zero is "0".
+/// Numbers of one column with equally many decimals, which give the largest number so many
+/// significant digits; a number that rounds to zero is "0".
 std::vector<std::string> format_column(const std::vector<double>& values, int digits);
 
 /// Returns "1 mode" or "3 modes"; `none` stands for 0.
@@ -60,8 +60,8 @@ std::string count(std::int64_t n, const std::string& what, const char* none = "0
 std::string joint_name(Eigen::Index i);
 
 /// "q2 - 0.43 q5 + 0.21 q1 (95 deg)": entries relative to the largest, by falling size, without the
-/// small ones; with the phase where an entry is not in step with the largest. At most `width`
-/// characters, where the numbers allow it.
+/// small ones; with the phase of an entry that is not in step with the largest. At most `width`
+/// characters, if the numbers allow it.
 std::string format_shape(const Eigen::VectorXcd& shape, std::size_t width);
 
 }  // namespace dashpot::apps

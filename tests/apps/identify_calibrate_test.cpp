@@ -10,10 +10,10 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// Releases of an iiwa with a payload and drives that its controller does not know of.
+/// Releases of an iiwa with a payload and drives that are unknown to its controller.
 class HiddenArm {
  public:
-  /// Its configuration, with what is known or all of it.
+  /// Its configuration, with some or all of its properties.
   static std::string config(const std::string& mass, const std::string& inertia) {
     return "{robot: {urdf: " + testing::arm_path("iiwa14") +
            ", base: iiwa_link_0, tip: iiwa_link_ee_kuka, reflected_inertia: " + inertia +
@@ -82,7 +82,7 @@ TEST(Calibrate, ShowsMeasuredBesidePredictedModesAndCalibrates) {
   const std::array<double, 8> values{1.5, 0.13, 0.12, 0.11, 0.1, 0.09, 0.08, 0.05};
   ASSERT_EQ(parameters.size(), values.size());
   EXPECT_EQ(parameters[0]["name"], "payload");
-  // Deviations are what they say, because what is not linear is in the model.
+  // Deviations are right, because the model includes what is not linear.
   EXPECT_LT(calibration["misfit"].get<double>(), 3);
   EXPECT_LT(calibration["misfit"].get<double>(), 0.2 * calibration["misfit_before"].get<double>());
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -103,7 +103,7 @@ TEST(Calibrate, ShowsMeasuredBesidePredictedModesAndCalibrates) {
   EXPECT_THAT(run_program({"identify", arm.logs[0], "--from", "1.51", "--to", "1.9", "--against",
                            guess, "--calibrate", "payload,colour"})
                   .err,
-              HasSubstr("'colour' is none of payload"));
+              HasSubstr("'colour' is unknown; there are payload"));
 }
 
 /// A mass at the centre that the configuration has explains no payload 5 cm beside it.
@@ -148,7 +148,7 @@ TEST(Calibrate, CalibratesAPayloadWithItsCenterAndInertia) {
   }
 }
 
-/// An arm of two joints whose gears bend: by four releases at two postures.
+/// An arm of two elastic joints, by four releases at two postures.
 TEST(Calibrate, FindsTheStiffnessOfGears) {
   DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
@@ -212,7 +212,7 @@ TEST(Calibrate, FindsTheStiffnessOfGears) {
   EXPECT_THAT(scratch.read("found.yaml"), HasSubstr("gear_stiffness: [59"));
   EXPECT_THAT(calibrated("", "none.yaml").err, HasSubstr("needs robot.gear_stiffness"));
 
-  // Few numbers are explained by many parameters, which shows nothing, and is no contradiction.
+  // Many parameters explain few numbers, which proves nothing and contradicts nothing.
   const std::string guess = scratch.write("guess.yaml", config(gears) + "}");
   const auto calibrated_by = [&](const std::string& file, const Words& more) {
     return run_program(
@@ -226,7 +226,7 @@ TEST(Calibrate, FindsTheStiffnessOfGears) {
   EXPECT_THAT(few.out, ::testing::Not(HasSubstr("does not explain the modes")));
   std::filesystem::remove(scratch.path("few.yaml"));
 
-  // Nothing that was measured, or nothing like what is predicted, calibrates nothing.
+  // Without measured modes that match predictions, nothing is calibrated.
   const Outcome still =
       calibrated_by(arguments[0], {"--to", "0.4", "--calibrate", "gear_stiffness"});
   EXPECT_EQ(still.status, 1);

@@ -113,7 +113,7 @@ TEST(IdentifyFiles, AskAboutUnitsOfTimeThatHardlyFit) {
   }
 }
 
-/// Each is what a recorder or a spreadsheet makes of it, and none of it changes the modes.
+/// Recorders and spreadsheets make such files; the modes are the same.
 TEST(IdentifyFiles, TakesWhatRecordersAddAndLeaveOut) {
   const Scratch scratch;
   const std::string good = decay_csv("time,q1,q2", 1), rows = good.substr(good.find('\n') + 1);
@@ -151,7 +151,7 @@ TEST(IdentifyFiles, TakesWhatRecordersAddAndLeaveOut) {
   expect_known_modes(identify({scratch.write("degrees.csv", degrees)}));
   expect_refusal(run_program({"identify", scratch.write("note.csv", column("time,q1,q2", "", "x")),
                               "--columns", "time,q1,q2,q3", "--channels", "q1,q3"}),
-                 "q3: 'x' is no number");
+                 "q3: 'x' is not a number");
 }
 
 /// Rows with the same cells at the end of each.
@@ -160,7 +160,7 @@ std::string with_columns(const std::string& heading, const std::string& cells) {
   return heading + "\n" + replaced(good, "\n", cells + "\n");
 }
 
-/// `run --csv` has where the tip is, and its errors, beside the joints.
+/// `run --csv` has the position and errors of the tip beside the joints.
 TEST(IdentifyFiles, TakesTheJointsAloneWhereTheTipIsBesideThem) {
   const Scratch scratch;
   const std::string file = scratch.write(
@@ -170,7 +170,7 @@ TEST(IdentifyFiles, TakesTheJointsAloneWhereTheTipIsBesideThem) {
   expect_known_modes(found);
   EXPECT_THAT(found["notes"].dump(),
               HasSubstr("left out beside the positions of joints: x, error_x, error_rx"));
-  // By itself the tip is a motion as any other.
+  // The tip alone is a motion like any other.
   const std::string tip = scratch.write("tip.csv", decay_csv("time [s],x [m],y [m]", 1));
   const Json alone = identify({tip});
   expect_known_modes(alone);
@@ -249,7 +249,7 @@ TEST(IdentifyFiles, RefusesInOneLineThatNamesFileLineAndColumn) {
           {{file("a,b\n1,2\n")}, "line 1: no column of time"},
           {{file("0,1\n1,2\n1,3\n")}, "line 1: numbers, where a line of names"},
           {{file("recorder\n\na,b\n1,2\n")}, "line 3: no column of time"},
-          {{file("time,q1\n12:00:00,2\n")}, "line 2, time: '12:00:00' is no time"},
+          {{file("time,q1\n12:00:00,2\n")}, "line 2, time: '12:00:00' is not a time"},
           {{file("\xFF\xFEt\n")}, "is text in UTF-16: save it as UTF-8"},
           {{file("SQLite format 3 of a bag")}, "dashpot.read_log(FILE)"},
           {{file(good), "--rate", "nan"}, "--rate: has to be a finite number"},
@@ -263,7 +263,7 @@ TEST(IdentifyFiles, RefusesInOneLineThatNamesFileLineAndColumn) {
           {{file(good), "--from", "2", "--to", "1"}, "--from: has to be before --to"},
           {{file("time,q1\n1,2\n2\n")}, "line 3: not 2 columns"},
           {{file("time,q1\n1,2,3\n")}, "line 2: not 2 columns"},
-          {{file("time,q1\n1,2\n2,x\n")}, "line 3, q1: 'x' is no number"},
+          {{file("time,q1\n1,2\n2,x\n")}, "line 3, q1: 'x' is not a number"},
           {{file("time,q1\nnan,2\n")}, "line 2: no time"},
           {{file(std::string("\x7f"
                              "ELF\0\0\1",

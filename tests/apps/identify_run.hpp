@@ -1,5 +1,5 @@
 #pragma once
-// Files of motion with known modes, and what `dashpot identify` says of them.
+// Files of motion with known modes, and the results of `dashpot identify`.
 
 #include <dashpot/tests/apps/json_result.hpp>
 
@@ -35,7 +35,7 @@ inline Json identify(const Words& arguments) {
   return parse(run_program(joined({"identify", "--json"}, arguments)));
 }
 
-/// The report on records that have no modes: the program says so in one line, and fails.
+/// The report on records without modes: the program fails with one line.
 inline Json no_modes(const Words& arguments) {
   Outcome outcome = run_program(joined({"identify", "--json"}, arguments));
   EXPECT_EQ(outcome.status, 1);

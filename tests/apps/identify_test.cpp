@@ -75,7 +75,7 @@ TEST(Identify, FindsModesOfAmbientMotion) {
   EXPECT_THAT(none.err, HasSubstr("no modes: motion under unknown forces"));
 }
 
-/// Seven modes of four decays as predicted; beside friction next to none, and the verdict says why.
+/// Seven modes of four decays as predicted; with friction almost none, and the verdict says why.
 TEST(Identify, FindsInScenesWhatIsPredictedOrSaysThatTheyAreNotLinear) {
   const Scratch scratch;
   const auto found_in = [&](const std::string& name) {
@@ -92,7 +92,7 @@ TEST(Identify, FindsInScenesWhatIsPredictedOrSaysThatTheyAreNotLinear) {
     EXPECT_LT(std::abs(one["natural_frequency"].get<double>()), 0.006);  // rad/s
   }
   const Json friction = found_in("ur5");
-  EXPECT_THAT(friction["notes"].dump(), HasSubstr("is no mode"));
+  EXPECT_THAT(friction["notes"].dump(), HasSubstr("not explained by modes"));
 }
 
 TEST(Identify, SaysFirstWhatARecordShows) {
