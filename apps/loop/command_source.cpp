@@ -11,7 +11,7 @@ namespace {
 
 using lcmtypes::Command;
 
-/// The receiver's part of a command that is in order: false if the controller refuses it.
+/// Carries out the receiver's part of a valid command; false if the controller refuses it.
 bool carry_out(Command& command, LoopGoal& goal, std::string& reason) {
   const std::int64_t before = command.accepted - 1;
   const auto change = [&command, before](controller::Gains& gains) {
@@ -64,7 +64,7 @@ bool CommandSource::take() noexcept {
   taken_ = false;
   if (!receiver_.fetch()) return false;
   const Command& command = receiver_.command();
-  // Only what is new: older parts may have been replaced by the scenario since.
+  // Only new parts: the scenario may have replaced older ones meanwhile.
   const std::int64_t before = std::exchange(commands_, command.accepted);
   for (std::int32_t part = 1; part <= kGoals; part *= 2) {
     taken_ = taken_ || ((kGoals & part) != 0 && lcmtypes::has_set(command, part, before));

@@ -13,8 +13,8 @@ namespace dashpot::apps {
 void refuse_second_loop(const std::shared_ptr<lcm::LCM>& bus);
 
 /// Takes commands for a loop from a bus. Gains, payload, tool, speeds and releases go to the
-/// controller on the receiver's thread, because they are judged, which may take milliseconds; what
-/// it refuses is refused whole. The rest goes to the loop's thread.
+/// controller on the receiver's thread, because judging them may take milliseconds; if it refuses
+/// one, the whole command is refused. The rest goes to the loop's thread.
 class CommandSource {
  public:
   /// `goal` must outlive it. Otherwise as CommandReceiver.
@@ -22,7 +22,7 @@ class CommandSource {
                 LoopGoal& goal);
 
   // The loop's thread; none of these ever waits.
-  /// Before a tick: tells the loop where to go. True if a fault is released with this tick.
+  /// Before a tick: sets the loop's goal. True if a fault is released with this tick.
   bool take() noexcept;
   /// Whether this tick's set-point was commanded.
   bool taken() const noexcept { return taken_; }
@@ -36,7 +36,7 @@ class CommandSource {
 
  private:
   LoopGoal& goal_;
-  std::int64_t commands_ = 0;  ///< accepted ones that the loop was told
+  std::int64_t commands_ = 0;  ///< accepted ones passed on to the loop
   bool taken_ = false;
   lcmtypes::CommandReceiver receiver_;
 };

@@ -27,7 +27,7 @@ InputError refusal(const std::string& reason) {
   return {"--excite", reason};
 }
 
-/// The words of a specification by their keys, each of which is asked for once.
+/// The words of a specification by their keys; each key is taken once.
 class ExcitationWords {
  public:
   explicit ExcitationWords(const std::string& text) {
@@ -65,7 +65,7 @@ class ExcitationWords {
   }
   void finish() const {
     if (words_.empty()) return;
-    throw refusal("'" + words_.begin()->first + "' is no key of a " + kind_);
+    throw refusal("'" + words_.begin()->first + "' is not a key of a " + kind_);
   }
 
  private:
@@ -73,7 +73,7 @@ class ExcitationWords {
   std::map<std::string, std::string> words_;
 };
 
-/// A wrench goes into the law over motion.gain_time: what is faster hardly gets through.
+/// Refuses an excitation faster than motion.gain_time, which filters the wrench of a set-point.
 void expect_through(const Excitation& excitation, const controller::Settings& settings) {
   if (!settings.feed_forward.wrench) {
     throw refusal("needs feed_forward.wrench: true, or no wrench acts");

@@ -25,7 +25,7 @@ struct Excitation {
 };
 
 /// Reads "pulse,direction=z,force=5,duration=0.5". Throws controller::InputError with the option as
-/// key if it is not as kExciteHelp says, or is none that this controller lets through.
+/// key if it is not as kExciteHelp says, or if the controller would suppress it.
 Excitation read_excitation(const std::string& text, const controller::Settings& settings);
 
 }  // namespace dashpot::apps

@@ -8,9 +8,9 @@
 
 namespace dashpot::apps {
 
-/// What stands between a measurement and a torque, in the terms of plugin.h. The loop's thread
-/// calls what is noexcept, and there nothing allocates or waits. Another thread, one at a time,
-/// calls the rest, which may take milliseconds; where nothing hurries it may be the same thread.
+/// Computes a torque from a measurement, in the terms of plugin.h. The loop's thread calls the
+/// noexcept functions, which do not allocate or wait. Another thread, one at a time, calls the
+/// others, which may take milliseconds; without real time it may be the same thread.
 class LoopController {
  public:
   LoopController() = default;
@@ -19,18 +19,18 @@ class LoopController {
   virtual ~LoopController() = default;
 
   /// A tick: the torque for this measurement, and a status. `time` in ns; n entries each.
-  /// `setpoint` says where to go, and is new if its time is; its gains do not count. Null: no news.
-  /// A pose is one of the T that a tick before has taken up.
+  /// `setpoint` is the goal, and is new if its time is; its gains do not count. Null: no new one.
+  /// A pose refers to the T that an earlier tick has taken up.
   virtual std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
                               const controller::Setpoint* setpoint,
                               JointVector& torque) noexcept = 0;
-  /// Stops the arm: the set-point is given up, until there is a new one.
+  /// Stops the arm: the set-point is dropped until a new one comes.
   virtual void stop() noexcept = 0;
   /// Whether a status of update() asks the host to engage the robot's own brakes.
   virtual bool needs_brakes() const noexcept = 0;
   /// Returns the snapshot of the last tick.
   virtual const dashpot_snapshot& snapshot() noexcept = 0;
-  /// Returns modes that are newer than those returned last; null if there are none.
+  /// Returns modes if they are newer than the modes returned last; otherwise null.
   virtual const dashpot_modes* new_modes() noexcept = 0;
   /// Does the same for the sampled loop.
   virtual const dashpot_sampled_modes* new_sampled_modes() noexcept { return nullptr; }
@@ -39,16 +39,16 @@ class LoopController {
   /// refusal; `reason` then says why, in one line.
   virtual std::int32_t start(const JointVector& q, std::string& reason) = 0;
   /// The springs and dampers from the next tick on. Returns as start(); with DASHPOT_OK `reason`
-  /// says what to be warned of, or nothing.
+  /// holds the warnings, if any.
   virtual std::int32_t set_gains(const controller::Gains& gains, std::string& reason) = 0;
-  /// Sets what the arm carries from the next tick on, where T is in the tip link, and the gains
-  /// for it, if there are new ones. Returns as set_gains().
+  /// Sets the payload from the next tick on, T in the tip link, and the gains for it, if there are
+  /// new ones. Returns as set_gains().
   virtual std::int32_t set_payload(const controller::Payload& payload, const controller::Pose& tool,
                                    const controller::Gains* gains, std::string& reason) = 0;
-  /// Sets how fast the tip may be from the next tick on. Returns as start().
+  /// Limits the speed of the tip from the next tick on. Returns as start().
   virtual std::int32_t limit_tip_speed(const controller::TipSpeed& speed, std::string& reason) = 0;
-  /// Whether the controller would go there, with these gains, from q; for one that is in no loop.
-  /// Returns as start().
+  /// Whether the controller would accept this set-point, with its gains, from q; for a controller
+  /// outside a loop. Returns as start().
   virtual std::int32_t check(const controller::Setpoint& setpoint, const JointVector& q,
                              std::string& reason) = 0;
   /// Releases a latched fault at the next tick: the robot is held where it is, until there is a new
@@ -71,7 +71,7 @@ class PluginLibrary {
   const dashpot_plugin* functions_ = nullptr;  // for the rest of the program
 };
 
-/// Nobody controls the masses of a system: zero torque, and the modes that its matrices have.
+/// A controller for uncontrolled masses: zero torque, and the modes of the matrices.
 std::unique_ptr<LoopController> make_null_controller(const MatrixSystem& system, double period);
 
 }  // namespace dashpot::apps

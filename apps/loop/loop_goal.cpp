@@ -20,7 +20,7 @@ void LoopGoal::begin(const controller::Setpoint& setpoint,
 const controller::Setpoint* LoopGoal::told(std::int64_t time) noexcept {
   told_ = false;
   if (!follow_tool()) return nullptr;
-  // New gains count with a set-point that is read again.
+  // The controller must read the set-point again for new gains to count.
   const std::int64_t changes = gain_changes_.load(std::memory_order_acquire);
   if (ticks_++ % repeat_every_ == 0 || changes != gain_changes_seen_) news_ = true;
   gain_changes_seen_ = changes;
@@ -50,12 +50,12 @@ bool LoopGoal::follow_tool() noexcept {
   }
   tool_ = tools_.value();
   news_ = true;
-  return false;  // this tick takes T up, if none before did
+  return false;  // this tick takes T up unless an earlier one did
 }
 
 void LoopGoal::note_status(std::int32_t status) noexcept {
   if (!told_) return;
-  // What was rejected shows in the status, once; then what was held before goes on.
+  // A rejection shows in the status once; then the previous set-point is held again.
   const bool rejected = news_ && status == DASHPOT_SETPOINT_REJECTED;
   if (rejected) setpoint_ = accepted_;
   if (news_ && !rejected) accepted_ = setpoint_;
@@ -103,7 +103,7 @@ std::int32_t LoopGoal::change(const Change& change, std::string& reason) {
   }
   if (code != DASHPOT_OK) {
     reason = said;
-    // Back to the speed that was in force, which therefore is not refused.
+    // The previous speed was accepted before, so it is not refused.
     if (slowed) controller_.limit_tip_speed(tip_speed_, said);
     return code;
   }

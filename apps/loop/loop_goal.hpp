@@ -13,72 +13,72 @@
 
 namespace dashpot::apps {
 
-/// What a loop is to do: the set-point that it holds, which is repeated so that it does not go
-/// stale, the gains in force, and what is attached to the tip link. Between the loop's thread and
-/// those that command it. A new T keeps the place of what is held on the tip link.
+/// The goal of a loop: the set-point, which is repeated so that it does not go stale, the active
+/// gains, and what is attached to the tip link. Shared by the loop's thread and the threads that
+/// command it. With a new T the goal of the tip link stays the same.
 class LoopGoal {
  public:
-  /// The controller must outlive it. The set-point is repeated once in so many ticks.
+  /// The controller must outlive it. The set-point is repeated every `repeat_every` ticks.
   LoopGoal(LoopController& controller, std::int64_t repeat_every)
       : controller_(controller), repeat_every_(repeat_every) {}
 
   // Before the loop begins:
-  /// Holds `setpoint`, with the gains in it, which the controller has taken already, and with what
-  /// is attached to the tip link.
+  /// Holds `setpoint`, with its gains, which the controller has already, and with what is attached
+  /// to the tip link.
   void begin(const controller::Setpoint& setpoint, const controller::Attachment& attachment);
 
-  /// Adds this wrench to that of what is held. Its time begins with the next tick; a fault ends it
-  /// for good.
+  /// Adds this wrench to the set-point's. Its time begins with the next tick; a fault ends it for
+  /// good.
   void excite(const Excitation& excitation) noexcept { excitation_ = excitation; }
 
   // The loop's thread:
-  /// Before a tick at `time`, ns: what the controller is told; null: nothing, as long as no tick
-  /// is known to have taken up a new T.
+  /// Before a tick at `time`, ns: the set-point for the controller; null as long as no tick is
+  /// known to have taken up a new T.
   const controller::Setpoint* told(std::int64_t time) noexcept;
   /// After that tick.
   void note_status(std::int32_t status) noexcept;
-  /// Goes there from the next tick on, with a pose of tool(). The gains of `setpoint` do not count.
+  /// Holds `setpoint`, with a pose of tool(), from the next tick on. Its gains do not count.
   void hold(const controller::Setpoint& setpoint) noexcept;
-  /// Stops the arm, for good: nothing is told from now on.
+  /// Stops the arm for good: the controller gets no further set-point.
   void stop() noexcept {
     if (!stopped_) controller_.stop();
     stopped_ = true;
   }
-  /// What the controller was told to hold last.
+  /// The last set-point for the controller.
   const controller::Setpoint& setpoint() const noexcept { return setpoint_; }
   /// T in the tip link, of the pose in setpoint().
   const controller::Pose& tool() const noexcept { return tool_; }
-  /// After a tick: whether a fault is latched. Meanwhile nothing is held. Whoever releases it finds
-  /// the robot held where it is until there is news; if the controller has let go of the fault by
-  /// itself, what was held before goes on.
+  /// After a tick: whether a fault is latched, during which nothing is held. After release() the
+  /// robot is held where it is until a new set-point comes; if the controller has released the
+  /// fault by itself, the previous set-point is held again.
   void note_fault(bool latched) noexcept;
 
   // Other threads, which may have to wait for each other. Before begin() changes are refused
   // (DASHPOT_NOTHING_YET) and releases do nothing, because the controller is being started:
-  /// Changes the gains in force; DASHPOT_OK, or the code of the controller's refusal, with its
-  /// reason in one line.
+  /// Changes the active gains; DASHPOT_OK, or the code of the controller's refusal, with its reason
+  /// in one line.
   std::int32_t change_gains(const std::function<void(controller::Gains&)>& change,
                             std::string& reason);
-  /// What a command or a scenario changes beside where to go; what is not there stays.
+  /// Changes by a command or a scenario beside the set-point; empty parts stay as they are.
   struct Change {
     std::function<void(controller::Gains&)> gains;
     std::optional<controller::Payload> payload;
     std::optional<controller::Pose> tool;  ///< T in the tip link
     std::optional<controller::TipSpeed> tip_speed;
   };
-  /// Makes all of a change, which the controller judges by what it leads to, or, if it is refused,
-  /// nothing. What the controller warns of goes to stderr. Otherwise as change_gains().
+  /// Makes all of a change, or nothing if the controller refuses its result. Warnings of the
+  /// controller go to stderr. Otherwise as change_gains().
   std::int32_t change(const Change& change, std::string& reason);
-  /// T in the tip link, as the controller was told last; the loop may not have taken it up yet.
+  /// The last T in the tip link for the controller; the loop may not have taken it up yet.
   controller::Pose latest_tool();
   /// Releases a latched fault at the next tick.
   void release();
 
  private:
-  /// Carries what is held over to a new T. False as long as it is unknown which T the controller
-  /// counts with in the next tick.
+  /// Converts the set-points to a new T. False as long as it is unknown which T the controller uses
+  /// in the next tick.
   bool follow_tool() noexcept;
-  /// Has the controller take the payload, the tool and, unless null, the gains.
+  /// Gives the controller the payload, the tool and, unless null, the gains.
   std::int32_t attach(const Change& change, const controller::Gains* gains, std::string& said);
 
   LoopController& controller_;
@@ -91,9 +91,9 @@ class LoopGoal {
   std::optional<std::int64_t> excited_since_;  ///< ns
   controller::Setpoint accepted_;              ///< the last that the controller did not reject
   bool stopped_ = false;
-  bool in_force_ = false;  ///< of setpoint_
+  bool in_force_ = false;  ///< setpoint_ is active
   bool news_ = true;       ///< setpoint_ is to be read again
-  bool told_ = false;      ///< the controller was told of it in this tick
+  bool told_ = false;      ///< the controller got it in this tick
   bool faulted_ = false;   ///< a fault was latched after the last tick
   std::int64_t ticks_ = 0;
   std::int64_t gain_changes_seen_ = 0;
@@ -102,7 +102,7 @@ class LoopGoal {
 
   // Between the threads:
   std::atomic<std::int64_t> gain_changes_{0};  ///< so far
-  std::atomic<bool> released_{false};          ///< somebody asked for the release of the fault
+  std::atomic<bool> released_{false};          ///< the release of the fault was asked for
   std::atomic<std::int64_t> tool_changes_{0};  ///< twice those so far; odd: one is under way
   controller::Latest<controller::Pose> tools_;
 

@@ -48,7 +48,7 @@ void LoopJournal::note_tick(std::int64_t utime, std::int32_t status,
 }
 
 void LoopJournal::note_fault(const dashpot_snapshot& snapshot) noexcept {
-  // One that latches again at the tick that released it has another name.
+  // A fault that latches again at the tick of its release is another fault.
   if (snapshot.fault != record.fault || (released_ && snapshot.fault != DASHPOT_OK)) {
     record.fault = snapshot.fault;
     record.fault_tick = 0;
@@ -86,7 +86,7 @@ void LoopJournal::publish(std::int64_t utime) noexcept {
     publish_now = true;
   }
   if (pace_ == Pace::kFast && publish_now) publisher_.publish_pending();
-  // Their thread keeps its own pace: with a faster one they would come at no particular time.
+  // Their thread keeps its own pace: in fast motion they would come at random times.
   if (pace_ == Pace::kRealTime && record.ticks % kPublishEvery == 0) {
     publish_sampled(utime, snapshot.time);
   }

@@ -61,7 +61,7 @@ void LoopThread::join() {
 void LoopThread::run() noexcept {
   const bool real_time = options_.pace == Pace::kRealTime;
   if (real_time) privileges_.scheduled = schedule_ahead_of_others();
-  loop_.controller().snapshot();  // what a first call allocates, see plugin.h
+  loop_.controller().snapshot();  // the first call allocates, see plugin.h
   const std::int64_t period = std::llround(1e9 * options_.period);
   std::int64_t deadline = now(CLOCK_MONOTONIC) + period;
   std::int64_t pause = 0;
@@ -101,8 +101,8 @@ void LoopThread::tick(std::int64_t utime) noexcept {
   const std::int32_t status = loop_.control();
   const std::int64_t time = std::min<std::int64_t>(now(CLOCK_MONOTONIC) - begin,
                                                    std::numeric_limits<std::int32_t>::max());
-  // Without real time nobody waits for the tick: all that matters is that its computing fits, and
-  // not what else the machine does meanwhile.
+  // Without real time only the computing time of the tick counts, not the time that other programs
+  // take meanwhile.
   if (fast && 1e-9 * static_cast<double>(time) > options_.period &&
       1e-9 * static_cast<double>(now(CLOCK_THREAD_CPUTIME_ID) - computed_before) >
           options_.period) {

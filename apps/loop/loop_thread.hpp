@@ -13,8 +13,8 @@ namespace dashpot::apps {
 using Pace = LoopJournal::Pace;
 
 /// Runs a closed loop on a thread of its own until it has made its ticks, the simulation fails or
-/// somebody stops it. In real time ticks begin at absolute deadlines; a deadline that lies more
-/// than a tick back is given up, and counted as an overrun. The loop allocates nothing, and waits
+/// stop() is called. In real time ticks begin at absolute deadlines; a deadline that lies more
+/// than a tick back is skipped, and counted as an overrun. The loop allocates nothing, and waits
 /// for nothing but its deadlines: the gains of the scenario are left to another thread, which calls
 /// ClosedLoop::follow_gains. Only without real time it has them judged and publishes on its own
 /// thread, so that no message is lost, and waits for modes that a background thread still solves,
@@ -27,8 +27,8 @@ class LoopThread {
     std::int64_t ticks = 0;
   };
 
-  /// `commands` may be null: none are taken. All must outlive it. In real time the publisher's
-  /// thread runs already.
+  /// `commands` may be null: no commands. All must outlive it. In real time the publisher's thread
+  /// runs already.
   LoopThread(ClosedLoop& loop, lcmtypes::Publisher& publisher, CommandSource* commands,
              const Options& options);
   ~LoopThread();

@@ -110,7 +110,7 @@ class PluginController : public LoopController {
   std::int32_t release() override { return plugin_.release(handle_.get()); }
 
  private:
-  /// Gains in the form that plugin.h wants them in.
+  /// Gains in the form of plugin.h.
   struct GainArrays {
     explicit GainArrays(const controller::Gains& from)
         : given(from),
@@ -171,7 +171,7 @@ class PluginController : public LoopController {
   dashpot_sampled_modes sampled_modes_{};
 };
 
-/// Where to look for the library, in this order.
+/// The places of the library, in the order of the search.
 std::vector<std::string> places(const std::string& path) {
   if (!path.empty()) return {std::filesystem::absolute(path)};
   std::error_code ignored;

@@ -11,7 +11,7 @@ namespace dashpot::apps {
 namespace {
 
 constexpr double kRepeat = 0.1;       // s between two repetitions of a set-point
-constexpr double kSettling = 0.1;     // s, beyond the time that the springs take to set in
+constexpr double kSettling = 0.1;     // s, beyond the time in which the springs set in
 constexpr double kGuidedSpeed = 0.2;  // at most this fraction of the velocity limits
 constexpr double kShortestWay = 0.5;  // s
 constexpr double kNanoseconds = 1e9;  // in a second
@@ -21,7 +21,7 @@ std::pair<double, double> ease(double s) {
   return {s * s * s * (10 + s * (-15 + 6 * s)), 30 * s * s * (1 - s) * (1 - s)};
 }
 
-/// How long the hand takes from rest to start, s.
+/// The time that the hand takes from rest to start, s.
 double guidance_time(const Scene& scene) {
   const JointVector way = (scene.start - scene.rest).cwiseAbs();
   if (way.isZero(0)) return 0;
@@ -140,7 +140,7 @@ std::optional<Eigen::Vector3d> ClosedLoop::contact_force() const noexcept {
   return arm_->wall_force(plant_->state());
 }
 
-/// One period in the hand, which takes the robot at rest and leaves it at rest.
+/// One period of a motion by hand, which begins and ends at rest.
 void ClosedLoop::carry(const LoopFault& fault) noexcept {
   if (hand_ != &fault) taken_at_ = plant_->position();
   hand_ = &fault;

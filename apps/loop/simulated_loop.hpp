@@ -9,7 +9,7 @@
 
 namespace dashpot::apps {
 
-/// The greatest values of a run, of the robot itself and not of its sensors.
+/// The greatest true values of a run, not the sensors'.
 struct Extremes {
   double speed_share = 0;     ///< of a joint's speed over its limit; 0 for a system of matrices
   double tip_speed = 0;       ///< m/s; likewise
@@ -23,34 +23,34 @@ struct Extremes {
 /// Equal calls give equal bits. Only the constructor throws.
 ///
 /// The constructor brings the robot to its start as a person would: a hand holds it at rest where
-/// the springs are fixed until the controller's torque has settled, guides it slowly to where it is
-/// to start, and lets go of it at time 0. What starts outside its position limits is held there
+/// the springs are fixed until the controller's torque has settled, guides it slowly to its start,
+/// and releases it at time 0. A robot that starts outside its position limits is held at its start
 /// from the first tick on.
 ///
-/// Gains are judged by the controller before it takes them, which may take milliseconds. In real
-/// time that is for another thread to do than the loop's: see leave_gains().
+/// The controller judges gains before it takes them, which may take milliseconds. In real time
+/// another thread than the loop's must do this: see leave_gains().
 class ClosedLoop {
  public:
-  /// Both must outlive it. Throws InputError if the controller refuses the first set-point, or is
-  /// not content with what the hand does.
+  /// Both must outlive it. Throws InputError if the controller refuses the first set-point, or
+  /// rejects it or latches a fault during the guidance.
   ClosedLoop(const Scene& scene, LoopController& controller);
 
   // The loop's thread:
   /// The user's part of a tick: takes the scenario's steps whose time has come.
   void follow_scenario() noexcept;
-  /// The controller's part of a tick: reads the sensors and finds a torque. Returns a status, that
-  /// of the last call in a period without one.
+  /// The controller's part of a tick: reads the sensors and computes a torque. Returns the status
+  /// of the call, or of the last one in a period without a call.
   std::int32_t control() noexcept;
   /// The robot's part: one period under that torque.
   sim::Status move() noexcept;
-  /// Returns what the scenario, or a command in its place, wants.
+  /// Returns the goal by the scenario or by a command.
   LoopGoal& goal() noexcept { return goal_; }
 
   // Another thread:
   /// From now on follow_scenario() leaves the gains of the scenario's steps to follow_gains().
   /// Before the loop begins.
   void leave_gains() noexcept { leave_gains_ = true; }
-  /// Brings the gains of the scenario's steps whose time has come. Always the same thread.
+  /// Sets the gains of the scenario's steps whose time has come. Always the same thread.
   void follow_gains();
   /// Steps whose gains the controller has refused, and why the last of them.
   int refused_steps() const noexcept { return refused_steps_; }

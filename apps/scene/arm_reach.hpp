@@ -9,14 +9,14 @@
 
 namespace dashpot::apps {
 
-/// Where the tip is to be, in what directions: `selected` (1 or 0 each) in the axes R.
+/// The goal of the tip in the directions `selected` (1 or 0 each) in the axes R.
 struct TipGoal {
   controller::Pose pose;
   controller::Vector6 selected = controller::Vector6::Ones();
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
 
-  /// Returns what is missing at `tip`, in the selected directions: m, and a rotation vector in rad;
-  /// base axes.
+  /// Returns the distance of `tip` from the goal in the selected directions: m, and a rotation
+  /// vector in rad; base axes.
   controller::Vector6 miss(const controller::DynamicsResult& tip) const {
     controller::Vector6 error;
     const Eigen::AngleAxisd turn(Eigen::Matrix3d(pose.rotation * tip.R_BT.transpose()));
@@ -66,8 +66,8 @@ inline controller::Vector6 descend(const controller::RobotModel& model,
   return miss;
 }
 
-/// By how much the arm misses the goal at the nearest position found within its limits, from `q`
-/// and from postures all over its range: zero, to 1e-6 m and rad, if it gets there.
+/// The distance from the goal at the nearest position found within the limits, from `q` and from
+/// postures all over the range: zero, to 1e-6 m and rad, if the arm reaches the goal.
 inline controller::Vector6 out_of_reach_by(const controller::RobotModel& model,
                                            const controller::Limits& limits, const TipGoal& goal,
                                            const controller::JointVector& q) {

@@ -17,7 +17,7 @@ namespace dashpot::apps {
 using controller::InputError;
 using controller::JointVector;
 
-/// Masses on springs and dampers that nobody controls: M qdd + C qd + K q = f(t).
+/// Uncontrolled masses on springs and dampers: M qdd + C qd + K q = f(t).
 struct MatrixSystem {
   Eigen::MatrixXd mass, damping, stiffness;
   std::vector<sim::Piece<JointVector>> forces;
@@ -35,15 +35,15 @@ struct ScenarioStep {
   double at = 0;  ///< s
   int line = 0;   ///< of the file
   controller::Setpoint setpoint;
-  std::optional<controller::Payload> payload;  ///< that the controller is told at this step
+  std::optional<controller::Payload> payload;  ///< for the controller at this step
 };
 
-/// From `begin` until just before `end`, s, the controller is called in every so many periods only.
+/// From `begin` until just before `end`, s, the controller is called in some periods only.
 struct LoopFault {
   double begin = 0;
   double end = 0;
-  int every = 1;         ///< 0: not at all
-  JointVector moved_by;  ///< n, rad; so far a hand moves the robot meanwhile; zero: it is held
+  int every = 1;         ///< called every so many periods; 0: never
+  JointVector moved_by;  ///< n, rad: a hand moves the robot by this meanwhile; zero: it is held
                          ///< where it is; empty: the last torque acts on
 };
 
@@ -56,7 +56,7 @@ struct Scene {
   bool ring_down = false;                ///< fit the modes of small releases, too
   sim::PlantOptions plant;
   lcmtypes::CommandLimits commands;    ///< what an arm may be commanded over a bus
-  std::vector<LoopFault> loop_faults;  ///< of an arm; of several at a time the first one counts
+  std::vector<LoopFault> loop_faults;  ///< of an arm; of overlapping ones the first counts
   bool outside_limits = false;         ///< an arm may start outside its position limits
   JointVector rest;                    ///< where the springs are fixed at first, rad
   JointVector start;                   ///< where the robot is let go, rad

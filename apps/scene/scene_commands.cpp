@@ -18,7 +18,7 @@ void read_microseconds(const YamlMapping& keys, const char* key, std::int64_t& m
   microseconds = std::llround(1e6 * seconds);
 }
 
-/// Reads a limit that may be lowered only.
+/// Reads a limit that can only be lowered.
 void read_at_most(const YamlMapping& keys, const char* key, const char* unit, double& limit) {
   const text::Range range{0, false, limit};
   read_number(keys, key, unit, range, limit);

@@ -11,7 +11,7 @@ using text::kPositive;
 using text::Units;
 using text::YamlMapping;
 
-/// Reads what the sensors show wrongly. Returns whether anything.
+/// Reads the errors of the sensors. Returns whether there are any.
 bool read_sensor_fault(const YamlMapping& keys, const Units& positions, sim::SensorFault& fault) {
   const auto n = static_cast<Eigen::Index>(positions.size());
   if (keys.has("position_offset")) {
@@ -33,7 +33,7 @@ bool read_sensor_fault(const YamlMapping& keys, const Units& positions, sim::Sen
          fault.not_a_number || fault.clock_offset != 0;
 }
 
-/// When the controller is not called. Whether ever.
+/// Reads when the controller is not called. Returns whether there is such a time.
 bool read_loop_fault(const YamlMapping& keys, const Units& positions, LoopFault& fault) {
   bool pause = false;
   read_switch(keys, "pause", pause);

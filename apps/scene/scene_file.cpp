@@ -16,8 +16,8 @@ using text::Units;
 using text::YamlMapping;
 using text::YamlNode;
 
-/// Returns what the controller believes of the robot, which is true unless `simulation.robot` says
-/// otherwise.
+/// Returns the controller's parameters of the robot; `simulation.robot` may change them for the
+/// simulation.
 sim::RobotParameters believed(const controller::Config& config) {
   const controller::ModelOptions& options = config.robot.options;
   sim::RobotParameters parameters;
@@ -48,7 +48,7 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
   if (!root.has("scenario")) {
     throw InputError("scenario",
                      "missing: this is a configuration of the controller, for dashpot_create; a "
-                     "scene says besides how it begins, such as scenario: {start: {position: [0, "
+                     "scene also has a start, such as scenario: {start: {position: [0, "
                      "...]}} (sim/scenes/panda.yaml has all keys)");
   }
   controller::Config config = controller::read_config(document, directory);
@@ -97,8 +97,8 @@ void read_system(const YamlNode& document, Scene& scene) {
   read_scenario(root, positions, scene);
 }
 
-/// Throws if fixed steps are too long for elastic gears: they would be damped by the integrator,
-/// and an arm that rings would look calm.
+/// Throws if fixed steps are too long for elastic gears: the integrator would damp them, and a
+/// ringing arm would look calm.
 void check_steps(const Scene& scene) {
   constexpr double kFinest = 0.5;  // omega h, at which RK4 damps with a ratio of 2e-4
   const sim::IntegratorOptions& integrator = scene.plant.integrator;
@@ -113,7 +113,7 @@ void check_steps(const Scene& scene) {
                        " s is possible, or adaptive steps, the default of such arms");
 }
 
-/// Throws unless the simulator takes the scene.
+/// Throws unless the simulator accepts the scene.
 void check(const Scene& scene) try {
   check_steps(scene);
   const auto mechanism = make_mechanism(scene);

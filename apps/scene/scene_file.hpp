@@ -11,7 +11,7 @@ namespace dashpot::apps {
 /// sim/scenes has examples with all keys. Throws InputError.
 Scene load_scene(const std::string& path);
 
-/// A configuration of the controller, and what may be commanded over a bus: all that a loop with a
+/// A configuration of the controller, and the limits of commands over a bus: all that a loop with a
 /// robot needs.
 struct CommandedConfig {
   controller::Config config;

@@ -8,15 +8,15 @@
 
 namespace dashpot::apps {
 
-/// What the simulation of an arm needs besides its options.
+/// The parameters and options of a simulated arm.
 struct ArmSimulation {
   sim::RobotParameters parameters;
   sim::ArmOptions options;
   std::filesystem::path directory;  ///< of the scene
 };
 
-/// Reads `simulation` of a scene of n joints into `plant`, and for an arm into `arm`; units are
-/// those of `positions` ("rad" or "m" each). Throws InputError.
+/// Reads `simulation` of a scene of n joints into `plant`, and for an arm into `arm`; `positions`
+/// has the unit of each joint ("rad" or "m"). Throws InputError.
 void read_simulation(const text::YamlMapping& root, const text::Units& positions,
                      sim::PlantOptions& plant, ArmSimulation* arm);
 
@@ -31,7 +31,7 @@ void read_body(const text::YamlMapping& keys, double& mass, Vector3& center, Mat
 /// Reads `commands`, of an arm. Throws InputError.
 void read_commands(const text::YamlMapping& root, lcmtypes::CommandLimits& limits);
 
-/// Reads `scenario` into the scene, whose arm or matrices are there already. Throws InputError.
+/// Reads `scenario` into the scene, which has its arm or matrices already. Throws InputError.
 void read_scenario(const text::YamlMapping& root, const text::Units& positions, Scene& scene);
 
 /// Reads `scenario.faults` into the plant's options and the scene. Throws InputError.
@@ -41,7 +41,7 @@ void read_faults(const text::YamlMapping& scenario, const text::Units& positions
 /// messages.
 std::vector<text::YamlMapping> mappings(const text::YamlMapping& keys, std::string_view key,
                                         std::span<const std::string_view> known_keys);
-/// Reads `begin` and `end` of what happens in a scenario; an end that is missing stays as it is.
+/// Reads `begin` and `end` of an event in a scenario; a missing end stays as it is.
 /// Throws InputError for an end that is not after the begin, and a begin after the scenario.
 void read_when(const text::YamlMapping& keys, const Scene& scene, double& begin, double& end);
 /// Throws unless `keys` has `key`; `parent` has `keys` under `name`.

@@ -41,7 +41,7 @@ Pose moved(const Pose& pose, const Vector6& displacement) {
           Eigen::AngleAxisd(turn.norm(), turn.normalized()) * pose.rotation};
 }
 
-/// Throws unless the joints may be at q, which stands under `key`.
+/// Throws unless q, given under `key`, is within the position limits.
 void check_limits(const YamlMapping& keys, std::string_view key, const JointVector& q,
                   const Units& positions, const Scene& scene) {
   const controller::Limits& limits = scene.arm->config.settings.limits;
@@ -55,7 +55,7 @@ void check_limits(const YamlMapping& keys, std::string_view key, const JointVect
   }
 }
 
-/// Throws if a joint would start faster than it may be.
+/// Throws if a joint would start faster than its limit.
 void check_speeds(const YamlMapping& keys, const Units& velocities, const Scene& scene) {
   const JointVector& most = scene.arm->config.settings.limits.velocity;
   for (int i = 0; i < scene.dof(); ++i) {
@@ -84,7 +84,7 @@ std::string out_of_reach(const Vector6& by) {
          format_number(by.tail<3>().norm(), 3) + " rad";
 }
 
-/// Throws unless the arm can bring its tip where a Cartesian set-point holds it.
+/// Throws unless the tip can reach a Cartesian set-point.
 void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
                  const Scene& scene) {
   if (setpoint.mode != controller::Mode::kCartesian) return;
@@ -156,7 +156,7 @@ void read_system_start(const YamlMapping& scenario, const Units& positions, Scen
   read_numbers(keys, "velocity", Units(positions.size(), "m/s"), kAnyNumber, scene.velocity);
 }
 
-/// When a push begins and ends.
+/// Reads when a push begins and ends.
 template <class Value>
 sim::Piece<Value> read_times(const YamlMapping& keys, const YamlMapping& scenario,
                              const Scene& scene) {
@@ -188,7 +188,7 @@ void read_system_pushes(const YamlMapping& scenario, const Units& positions, Sce
   }
 }
 
-/// Bodies that the arm picks up, and puts down again, beside what it carries all the time.
+/// Reads bodies that the arm picks up and puts down again, in addition to its payload.
 void read_loads(const YamlMapping& scenario, Scene& scene) {
   static constexpr std::array<std::string_view, 5> kKeys = {"begin", "end", "mass", "center",
                                                             "inertia"};

@@ -25,7 +25,7 @@ Units joint_units(const Units& positions, const char* revolute, const char* pris
   return units;
 }
 
-/// Sets `value` to n numbers if the key is there; otherwise it stays empty, which is off.
+/// Sets `value` to n numbers if the key is there; otherwise it stays empty: off.
 void read_joint_option(const YamlMapping& keys, std::string_view key, const Units& units,
                        const Range& range, JointVector& value, double none = text::kNoNone) {
   if (!keys.has(key)) return;

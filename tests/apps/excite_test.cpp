@@ -1,4 +1,4 @@
-// `dashpot run --excite`: the wrench that acts, what is refused, and what a fault leaves of it.
+// `dashpot run --excite`: the wrench that acts, refusals, and the effect of a fault.
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/places.hpp>
@@ -17,8 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// A calm scene whose springs are at the joints, so that the tip's wrench is that of the
-/// excitation.
+/// A calm scene with springs at the joints, so the tip's wrench is the excitation alone.
 std::string calm_scene(const Scratch& scratch, const std::string& more = "") {
   return scratch.write("scene.yaml",
                        R"(
@@ -51,7 +50,7 @@ struct Excited {
     while (log.read()) log.handle();
   }
 
-  /// That of the measured modes one at least is where it is predicted, of its shape if `shapes`.
+  /// Expects at least one measured mode at its predicted place, and of its shape if `shapes`.
   void expect_close(bool shapes) const {
     int close = 0;
     for (const auto& difference : identified.at("difference")) {
@@ -128,7 +127,7 @@ TEST(Excite, AChirpSweepsItsFrequenciesAndWhatItMovesIsIdentified) {
   run.expect_close(false);
 }
 
-// The sensors show no numbers for 50 ms at 1 s, which latches; the controller releases the fault.
+// The sensors show NaN for 50 ms at 1 s, which latches a fault; the controller releases it.
 TEST(Excite, EndsForGoodAtAFault) {
   const Scratch scratch;
   const std::string path = calm_scene(scratch, "watchdog: {release_after: 0.2 s}");
@@ -141,8 +140,8 @@ TEST(Excite, EndsForGoodAtAFault) {
   ASSERT_EQ(states.size(), 2000u);
   EXPECT_EQ(states[1040].fault, states[1040].status);
   EXPECT_NE(states[1040].fault, 0);
-  EXPECT_EQ(states[1900].fault, 0);  // the controller has let go of it
-  // Until 1.05 s nothing is measured, and the state shows the last that was.
+  EXPECT_EQ(states[1900].fault, 0);  // the controller has released it
+  // Until 1.05 s nothing is measured, and the state shows the last measurement.
   for (std::size_t i = 1055; i < states.size(); ++i) ASSERT_EQ(states[i].tip_wrench[2], 0) << i;
   EXPECT_EQ(states[380].tip_wrench[2], 2);
 }
@@ -164,7 +163,7 @@ TEST(Excite, RefusesWhatIsTooMuch) {
       {"pulse,direction=w,force=1,duration=0.5", "direction is x, y, z, rx, ry or rz, not 'w'"},
       {"pulse,force=1,duration=0.5", "a pulse needs direction"},
       {"pulse,direction=z,force=1", "a pulse needs duration"},
-      {"pulse,direction=z,force=1,duration=0.5,to=3", "'to' is no key of a pulse"},
+      {"pulse,direction=z,force=1,duration=0.5,to=3", "'to' is not a key of a pulse"},
       {"pulse,direction=z,force=1,force=2,duration=0.5", "force is given twice"},
       {"pulse,direction", "KEY=VALUE is wanted, not 'direction'"},
       {"pulse,direction=z,force=1,duration=0.5,every=0.4,count=2", "every has to be from 0.5"},

@@ -1,4 +1,4 @@
-// What a loop is told while it runs, with a controller that only writes it down.
+// Commands to a running loop, with a controller that only records them.
 #include <dashpot/apps/loop/loop_goal.hpp>
 
 #include <gmock/gmock.h>
@@ -111,13 +111,13 @@ TEST_F(Goal, LeavesAllAsItWasIfSomethingIsRefused) {
   EXPECT_EQ(goal.change(all, reason), DASHPOT_UNSTABLE_GAINS);
   EXPECT_EQ(reason, "no payload 2.0 with 0.5");
   EXPECT_THAT(notes.calls, ElementsAre("speed 0.1", "payload 2.0 with 0.5", "speed 0.3"));
-  // The gains that were refused are not in force: the old ones are no news, these are.
+  // The refused gains are not active: the old gains change nothing, the new ones do.
   notes.calls.clear();
   notes.refused = "";
   EXPECT_EQ(goal.change({ratio(0.7), {}, {}, {}}, reason), DASHPOT_OK);
   EXPECT_EQ(goal.change({ratio(0.5), {}, {}, {}}, reason), DASHPOT_OK);
   EXPECT_THAT(notes.calls, ElementsAre("gains 0.5"));
-  // Where the speed is refused, nothing else is tried.
+  // If the speed is refused, nothing else is tried.
   notes.calls.clear();
   notes.refused = "speed";
   EXPECT_EQ(goal.change({ratio(0.4), controller::Payload{1}, {}, controller::TipSpeed{.linear = 9}},
@@ -156,8 +156,8 @@ TEST_F(Goal, TellsToolAndPayloadEachWithTheOther) {
                                        "payload 4.0 at 0.3", "payload 3.0 at 0.4"));
 }
 
-/// A tick gives the controller a pose of the T that an earlier one has taken up. So there is none
-/// from when T may be taken up until a tick has surely done so.
+/// A tick gives the controller a pose of the T that an earlier tick has taken up. So it gives none
+/// while a new T may or may not have been taken up.
 TEST_F(Goal, HoldsTheSamePlaceOnTheTipLinkWithANewTool) {
   setpoint.tip_pose.position << 0.5, 0, 0.4;
   setpoint.tip_pose.rotation = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()).matrix();
@@ -182,7 +182,7 @@ TEST_F(Goal, HoldsTheSamePlaceOnTheTipLinkWithANewTool) {
       setpoint.tip_pose.position + 0.2 * setpoint.tip_pose.rotation.col(2);
   EXPECT_LT((told->tip_pose.position - moved).norm(), 1e-15);
   EXPECT_EQ(goal.tool().position.z(), 0.3);
-  // A refused tool leaves nothing behind, and a rejected pose the one before, of this T.
+  // A refused tool has no effect, and a rejected pose restores the previous one, of this T.
   notes.refused = "payload";
   notes.meanwhile = nullptr;
   ASSERT_NE(goal.change({{}, {}, tool_at(0.7), {}}, reason), DASHPOT_OK);
@@ -198,7 +198,7 @@ TEST_F(Goal, HoldsTheSamePlaceOnTheTipLinkWithANewTool) {
   EXPECT_NEAR(told->tip_pose.position.x(), 100, 1e-12);
   goal.note_status(DASHPOT_SETPOINT_REJECTED);
   EXPECT_LT((tick()->tip_pose.position - setpoint.tip_pose.position).norm(), 1e-15);
-  // A payload alone holds nobody up.
+  // A payload alone does not delay the set-point.
   ASSERT_EQ(goal.change({{}, controller::Payload{1}, {}, {}}, reason), DASHPOT_OK);
   EXPECT_NE(tick(), nullptr);
 }
