@@ -56,7 +56,7 @@ Json release_json(const analysis::Response& response, const analysis::Spectrum<>
       values[k] = row.dot(state.head(motion.size()));
       if (std::abs(values[k]) > kSettled) last = i;
     }
-    if (grows || last > kPoints / 4) break;  // otherwise a slow mode that this place hardly sees
+    if (grows || last > kPoints / 4) break;  // otherwise a slow mode hardly moves this place
     horizon = std::max(3 * times[static_cast<std::size_t>(last) + 1], 0.02);
   }
   const auto lowest = std::min_element(values.begin(), values.end());

@@ -7,8 +7,8 @@
 
 namespace dashpot::apps {
 
-/// Returns how a motion that is let go one unit away comes to rest, and how that looks from the
-/// goal: the step to a goal one unit away is one minus it.
+/// Returns how a place that is released one unit away comes to rest; one minus it is the step to a
+/// goal one unit away.
 nlohmann::ordered_json release_json(const analysis::Response& response,
                                     const analysis::Spectrum<>& spectrum,
                                     const Eigen::VectorXd& motion, const Eigen::RowVectorXd& row);

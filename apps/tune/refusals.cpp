@@ -34,14 +34,14 @@ Json refusals(const TunedArm& arm, const TunedDesign& design, const controller::
   const std::string lost = controller::lost_directions(arm.model(), q);
   if (!lost.empty() && design.stated.mode == controller::Mode::kCartesian) {
     result.push_back(refusal_json("q", "the posture is singular: no spring acts in direction " +
-                                           lost + "; a damping ratio is no advice here"));
+                                           lost + "; a damping ratio means little here"));
   }
   const std::string heavy = controller::too_heavy(arm.model(), q);
   if (!heavy.empty()) result.push_back(refusal_json("q", heavy));
   if (arm.torque_guessed()) {
     result.push_back(refusal_json("limits.torque",
                                   "the model has no effort limits; this page takes 100 N m, a "
-                                  "configuration has to say what each joint gives"));
+                                  "configuration must state the limit of each joint"));
   }
   const controller::Gains& gains = design.settings.initial.gains;
   if (design.stated.inertia_blocks) {

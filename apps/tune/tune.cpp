@@ -40,7 +40,7 @@ std::string panda_path() {
   throw InputError("", std::string("there is no ") + kPanda + " here: give CONFIG or --urdf");
 }
 
-/// The postures of the file or log, evenly fewer where there are more than the page takes.
+/// The postures of the file or log, thinned out evenly to as many as the page takes.
 std::vector<controller::JointVector> listed(const TuneOptions& options,
                                             const controller::RobotModel& model) {
   std::vector<controller::JointVector> all = options.postures.listed(options.posture, model);
@@ -52,7 +52,7 @@ std::vector<controller::JointVector> listed(const TuneOptions& options,
   return some;
 }
 
-/// The posture of --q, else the start of the configuration's scenario, else the usual one.
+/// The posture of --q, or else the start of the configuration's scenario, or else the default.
 controller::JointVector posture_of(const TuneOptions& options,
                                    const controller::RobotModel& model) {
   const text::YamlNode document = text::parse_yaml(text::read_regular_file(options.config));
@@ -147,11 +147,10 @@ void add_tune(CLI::App& program) {
                           ->add_option("--postures", options->postures.file,
                                        "Postures to choose from, YAML or JSON")
                           ->option_text("FILE");
-  command
-      ->add_option("--log", options->postures.log, "Postures to choose from: those of an LCM log")
+  command->add_option("--log", options->postures.log, "LCM log with postures to choose from")
       ->excludes(file)
       ->option_text("FILE");
-  command->add_option("--port", options->port, "Of 127.0.0.1; 0 is any free port")
+  command->add_option("--port", options->port, "Port of 127.0.0.1; 0 is any free port")
       ->check(CLI::Range(0, 65535))
       ->option_text("N (" + std::to_string(kTunePort) + ")");
   command->footer(

@@ -174,7 +174,7 @@ Json TuneSite::answer(const std::string& path, const Json& asked) {
 HttpAnswer TuneSite::post(const std::string& path, const std::string& body) {
   if (path != "/design" && path != "/workspace") return answer_of(404, {{"error", "not found"}});
   const Json asked = Json::parse(body, nullptr, false);
-  if (asked.is_discarded()) return answer_of(400, {{"error", "is no JSON"}});
+  if (asked.is_discarded()) return answer_of(400, {{"error", "is not JSON"}});
   try {
     return answer_of(200, answer(path, asked));
   } catch (const std::exception& error) {  // bad input, or a loop without a spectrum

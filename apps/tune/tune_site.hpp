@@ -10,7 +10,7 @@
 
 namespace dashpot::apps {
 
-/// The arm, posture and designs that the page begins with.
+/// The arm, posture and designs at the start of the page.
 struct TuneStart {
   controller::JointVector q;
   nlohmann::ordered_json designs;                      ///< two of them
@@ -18,7 +18,7 @@ struct TuneStart {
   std::vector<controller::JointVector> postures = {};  ///< to choose from; at most kMostListed
 };
 
-/// Answers the page of `dashpot tune`: it computes, and keeps nothing but models of the arm.
+/// Answers the page of `dashpot tune`. It computes, and keeps only models of the arm.
 class TuneSite {
  public:
   static constexpr std::int64_t kMostPostures = 500;  ///< of one request
@@ -32,7 +32,7 @@ class TuneSite {
   /// /design {"q", "place", "design"}: TunedLoop::at, and "refused";
   /// /workspace {"design", "seed", "first", "count"}: TunedLoop::workspace.
   HttpAnswer post(const std::string& path, const std::string& body);
-  /// The secret that a POST has to bring in its header kTokenHeader.
+  /// The secret that a POST must have in its header kTokenHeader.
   const std::string& token() const { return token_; }
 
  private:

@@ -21,13 +21,13 @@ using text::Range;
 using text::YamlMapping;
 using text::YamlNode;
 
-/// With the text of the URDF, so that each arm is made from the same.
+/// Includes the text of the URDF, so that each arm is made from the same text.
 controller::RobotDescription with_text(controller::RobotDescription robot) {
   if (robot.text.empty()) robot.text = controller::read_urdf_file(robot.urdf);
   return robot;
 }
 
-constexpr int kMostDelay = 20;          // ticks, as for the controller; more takes seconds
+constexpr int kMostDelay = 20;          // ticks, as in the controller; more takes seconds
 constexpr double kMostPayload = 1e3;    // kg
 constexpr Range kMargin{1, true, 1e6};  // of gain
 constexpr Range kUpToMillion{0, true, 1e6};
@@ -35,7 +35,7 @@ constexpr Range kUpToMillion{0, true, 1e6};
 template <class Value>
 using Choices = std::array<std::pair<std::string_view, Value>, 2>;
 
-/// Null stands for a key that is missing, or, in a list, for none.
+/// Removes keys that are null, and replaces null in lists by "none".
 Json without_nulls(Json json, int depth = 0) {
   constexpr int kDeepest = 8;  // a design has four levels
   if (!json.is_structured()) return json;
@@ -74,7 +74,7 @@ Json part_of(const Json& design, const char* stiffness, const char* damping, dou
   return part;
 }
 
-/// Returns F sqrt(K), entry by entry, as an audit has it.
+/// Returns F sqrt(K), entry by entry, as an audit does.
 template <class Matrix>
 Matrix of_root(double factor, const Matrix& K) {
   return factor * K.cwiseMax(0).cwiseSqrt();
@@ -117,7 +117,7 @@ controller::Settings settings_of(const TunedArm& arm, const controller::AuditOpt
   settings.null_projector = stated.null_projector;
   controller::Gains gains = stated.gains;
   if (stated.half_quaternion) gains.task_stiffness.bottomRightCorner<3, 3>() *= 0.5;
-  if (stated.mode == Mode::kCartesian) {  // those of the other mode are not looked at
+  if (stated.mode == Mode::kCartesian) {  // the joint gains do not matter
     gains.joint_stiffness = arm.settings().initial.gains.joint_stiffness;
     gains.joint_damping = arm.settings().initial.gains.joint_damping;
     gains.joint_damping_ratio = arm.settings().initial.gains.joint_damping_ratio;

@@ -9,7 +9,7 @@
 
 namespace dashpot::apps {
 
-/// The arm of `dashpot tune`, with what the page may tell of it besides.
+/// The arm of `dashpot tune`, with the changes that the page may make.
 class TunedArm {
  public:
   /// The settings of a configuration, or null: default settings. Throws controller::InvalidModel.
@@ -19,7 +19,7 @@ class TunedArm {
   /// Returns the model and the settings as given.
   const controller::RobotModel& model() const { return model_; }
   const controller::Settings& settings() const { return settings_; }
-  /// Whether nobody has said what the joints give: the settings have 100 N m, to calculate with.
+  /// Whether the torque limits are unknown: the settings have 100 N m, to calculate with.
   bool torque_guessed() const { return torque_guessed_; }
 
   /// Makes another arm of {"payload": {"mass", "center", "inertia"}, "reflected_inertia",
@@ -35,28 +35,27 @@ class TunedArm {
   bool own_settings_, torque_guessed_;
 };
 
-/// Gains on an arm in a loop, as the page tells them.
+/// Gains on an arm in a loop, in the form of the page.
 struct TunedDesign {
-  controller::AuditOptions stated;  ///< but for damping by a ratio, which is in `stated.gains`
+  controller::AuditOptions stated;  ///< except damping by a ratio, which is in `stated.gains`
   controller::Settings settings;    ///< as the controller would have them
 
   /// Whether a damping is designed at each posture, by the controller's own design.
   bool designed() const;
 };
 
-/// Reads a design. Its keys are those of docs/tuning-page.md; a key that is missing has its
-/// default. Throws InputError for other keys, and for what is no gain at all: a wrong size or type.
+/// Reads a design with the keys of docs/tuning-page.md; a missing key has its default. Throws
+/// InputError for other keys, and for gains of a wrong size or type.
 TunedDesign read_design(const TunedArm& arm, const nlohmann::ordered_json& design);
 
-/// Returns the gains of settings as the page tells them, the inverse of read_design.
+/// Returns the gains of settings in the form of the page, the inverse of read_design.
 nlohmann::ordered_json design_json(const TunedArm& arm);
 
-/// Returns what the description of the arm says besides its URDF, base and tip, under the keys that
-/// a configuration has in `robot`; a key that has its default is missing.
+/// Returns the description of the arm without URDF, base and tip, with the keys of `robot` in a
+/// configuration; a key that has its default is missing.
 nlohmann::ordered_json robot_keys(const controller::RobotDescription& robot);
 
-/// Returns JSON as YAML, which it is but for null: that stands for a key that is missing, or, in a
-/// list, for none.
+/// Returns JSON as YAML. Null, which differs, stands for a missing key, or in a list for none.
 text::YamlNode yaml_of(const nlohmann::ordered_json& json);
 
 }  // namespace dashpot::apps

@@ -38,8 +38,8 @@ int largest_joint(const Eigen::VectorXcd& shape, int n) {
   return static_cast<int>(at);
 }
 
-/// The block of A, in the coordinates of the gears, by which the controller's torques follow what
-/// it measures, n x n.
+/// The block of A, in the coordinates of the gears, from the controller's measurements to its
+/// torques, n x n.
 MatrixXd of_controller(const analysis::Gears& gears, const MatrixXd& A) {
   const Eigen::Index n = gears.data().stiffness.size();
   MatrixXd block(n, n);
@@ -49,7 +49,7 @@ MatrixXd of_controller(const analysis::Gears& gears, const MatrixXd& A) {
   return block;
 }
 
-/// d ratio / d entry of the stiffness and damping that the controller has, a matrix a mode.
+/// d ratio / d entry of the controller's stiffness and damping, one matrix for each mode.
 Json sensitivity_json(const analysis::System<>& system, const analysis::Spectrum<>& spectrum,
                       const analysis::Gears& gears, const MatrixXd* J) {
   Json of_stiffness = Json::array(), of_damping = Json::array();
@@ -65,8 +65,8 @@ Json sensitivity_json(const analysis::System<>& system, const analysis::Spectrum
   return {{"stiffness", of_stiffness}, {"damping", of_damping}};
 }
 
-/// Which motion comes to the edge of stability first when the gains grow: the loop with gains just
-/// beyond the margin has a z outside the unit circle.
+/// The motion that becomes unstable first when the gains grow: with gains just beyond the margin
+/// the loop has a z outside the unit circle.
 Json limit_json(const analysis::System<>& system, const analysis::SampledLoop& loop, double margin,
                 const controller::RobotModel& model) {
   if (!(margin > 0) || !std::isfinite(margin)) return nullptr;
@@ -110,8 +110,8 @@ Json limit_json(const analysis::System<>& system, const analysis::SampledLoop& l
   return {{"frequency", turn / loop.period}, {"joint", joint}};
 }
 
-/// Sets C_C, or C_q, of the damping that the controller has designed: with J# of
-/// `consistent_inverse` the null space's dampers vanish in J#' C J#.
+/// Sets C_C, or C_q, to the damping that the controller designed: with J# of `consistent_inverse`
+/// the null space's dampers vanish in J#' C J#.
 void set_designed_damping(const analysis::System<>& system, const analysis::Gears& gears,
                           const MatrixXd& friction, analysis::TaskImpedance& parts) {
   MatrixXd passive = MatrixXd::Zero(system.dof(), system.dof());
@@ -136,7 +136,7 @@ Json gains_json(const analysis::TaskImpedance& parts, const MatrixXd& friction) 
           {"damping", json_rows(*parts.damping - friction)}};
 }
 
-/// The loop as `dashpot analyze` takes it: as its parts, or where gears bend as a whole.
+/// The loop for `dashpot analyze`: in parts, or with elastic gears as a whole.
 Json system_json(const analysis::System<>& system, const analysis::TaskImpedance& parts,
                  bool rigid) {
   if (!rigid) {
@@ -238,7 +238,7 @@ nlohmann::ordered_json TunedLoop::workspace(std::uint64_t seed, std::int64_t fir
     work();
   }
   if (failure) std::rethrow_exception(failure);
-  count = std::min(count, next.load());  // the threads end what they have begun
+  count = std::min(count, next.load());  // the threads finish postures that they have begun
   Json result = {{"count", count},
                  {"smallest_ratio", Json::array()},
                  {"gain_margin", Json::array()},
@@ -304,7 +304,7 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
   }
   const bool task = design_.stated.mode == Mode::kCartesian;
   if (task && design_.designed() && !controller::lost_directions(model, q).empty()) {
-    result["gains"]["damping"] = nullptr;  // it would fit no posture beside this one
+    result["gains"]["damping"] = nullptr;  // it fits this posture only
   }
   if (!design_.stated.inertia_blocks) {
     result["sensitivity"] = sensitivity_json(loop.system, loop.spectrum, gears_,

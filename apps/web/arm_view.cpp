@@ -54,7 +54,7 @@ ArmView::ArmView(const std::string& config) : config_(controller::load_config(co
   try {
     const Scene scene = load_scene(config);
     if (scene.arm) simulated_wall_ = scene.arm->options.wall;
-  } catch (const InputError&) {  // a configuration, which is no scene
+  } catch (const InputError&) {  // a configuration without a scene
   }
 }
 

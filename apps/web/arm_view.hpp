@@ -13,7 +13,7 @@ namespace dashpot::apps {
 /// Returns the chain for the page's kinematics: {"name", "joints": [{"name", "prismatic",
 /// "lower", "upper", "origin", "axis", "frame"}], "tip"}. With T_0 = I,
 ///     T_i = T_i-1 [Rot(axis, q_i), origin] frame      (prismatic: [I, origin + q_i axis] frame)
-/// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4.
+/// is the frame of link i in B, and T_n tip is the frame of the tip. Frames are rows of 4 x 4.
 nlohmann::ordered_json chain_json(const controller::RobotModel& model);
 
 /// What a page needs to know of the arm beyond the messages.
@@ -24,11 +24,11 @@ class ArmView {
 
   int dof() const { return config_.model.dof(); }
   double period() const { return config_.settings.period; }
-  /// The gain margin that gains have to leave, no unit.
+  /// The gain margin that gains must leave, no unit.
   double gain_margin() const { return config_.settings.limits.gain_margin; }
 
-  /// Returns the chain with {"walls": [{"name", "point", "normal", "stiffness"}]} besides. A wall's
-  /// normal points to where the tip may be; a simulated wall has a stiffness, N/m, others null.
+  /// Returns the chain with {"walls": [{"name", "point", "normal", "stiffness"}]}. A wall's normal
+  /// points to the free side; a simulated wall has a stiffness, N/m, others null.
   nlohmann::ordered_json chain() const;
 
   /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if

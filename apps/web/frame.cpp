@@ -32,7 +32,7 @@ void Alarms::take(const state_t& message) {
     ++changes_of_ratio;
     changed_at_ = message.tick;
   }
-  if (message.tick < changed_at_) changed_at_ = 0;  // the loop began anew
+  if (message.tick < changed_at_) changed_at_ = 0;  // the loop has restarted
   wanted_ratio = ratio;
   if (message.fault != 0 && message.fault_tick != fault_tick_) ++faults;
   fault_tick_ = message.fault != 0 ? message.fault_tick : 0;
@@ -46,7 +46,7 @@ void Alarms::take(const modes_t& message) {
     const double ratio = message.damping_ratio[i];
     const auto kind = static_cast<analysis::ModeKind>(message.kind[i]);
     if (kind == analysis::ModeKind::kSoft || !std::isfinite(ratio)) continue;
-    if (message.tick < changed_at_) continue;  // what was wanted then was another ratio
+    if (message.tick < changed_at_) continue;  // the wanted ratio was another one then
     if (smallest_ratio && ratio >= *smallest_ratio) continue;
     smallest_ratio = ratio;
     worst_utime = message.utime;

@@ -10,10 +10,10 @@
 
 namespace dashpot::apps {
 
-/// What was worst so far. Soft modes have no ratio that means anything, and do not count.
+/// The worst values so far. Soft modes do not count, because their ratio means nothing.
 struct Alarms {
   std::optional<double> wanted_ratio;    ///< that the springs' damping is designed for; 0: none
-  std::int64_t changes_of_ratio = 0;     ///< how often another one was wanted
+  std::int64_t changes_of_ratio = 0;     ///< how often the wanted ratio changed
   std::optional<double> smallest_ratio;  ///< since the last of these changes
   std::int64_t worst_utime = 0;          ///< us
   std::vector<double> worst_posture;     ///< joint positions of the smallest ratio, rad or m
@@ -59,7 +59,7 @@ struct Frame {
   }
 };
 
-/// JSON text of a document, on one line. Texts that are no UTF-8 are mended.
+/// JSON text of a document, on one line. Invalid UTF-8 is replaced.
 std::string line_of(const nlohmann::ordered_json& document);
 
 }  // namespace dashpot::apps

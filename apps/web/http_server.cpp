@@ -25,9 +25,9 @@ namespace {
 using HttpClock = std::chrono::steady_clock;
 
 constexpr std::size_t kConnectionMemory = 32768;
-constexpr int kBacklog = 256;  // a browser whose connection does not fit waits for a second
+constexpr int kBacklog = 256;  // a browser beyond the backlog waits for a second
 
-/// What the browser is told with every answer: nothing from elsewhere, nothing kept, no frame.
+/// Headers of every answer: nothing from other origins, no caching, no frames.
 constexpr std::array<std::pair<const char*, const char*>, 6> kHeaders = {{
     {"Content-Security-Policy",
      "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
@@ -174,7 +174,7 @@ HttpAnswer HttpServer::Parts::judge_post(MHD_Connection* connection) const {
   if (header(connection, "Content-Type") != "application/json") {
     return refusal(415, "JSON alone is taken");
   }
-  if (!header(connection, "Transfer-Encoding").empty()) {  // of which the length would not hold
+  if (!header(connection, "Transfer-Encoding").empty()) {  // its length is unknown
     return refusal(411, "a body in chunks is not taken");
   }
   const std::string length = header(connection, "Content-Length");
@@ -228,7 +228,7 @@ MHD_Result HttpServer::Parts::open_stream(MHD_Connection* connection) {
   if (streams.size() >= kMostStreams) {
     return queue_answer(connection, refusal(503, "too many pages are open"));
   }
-  if (streams.empty()) event = nullptr;  // of a page that is long gone
+  if (streams.empty()) event = nullptr;  // of an earlier page
   Stream& stream = streams.emplace_back();
   stream.parts = this;
   stream.connection = connection;
@@ -319,7 +319,7 @@ HttpServer::HttpServer(int port, HttpContent content) : parts_(std::make_unique<
   const MHD_AccessHandlerCallback handle = [](void* of, MHD_Connection* connection, const char* url,
                                               const char* method, const char*, const char* data,
                                               std::size_t* upload, void** seen) {
-    try {  // the library in between is one of C
+    try {  // exceptions must not pass through a C library
       return static_cast<Parts*>(of)->take(connection, url, method, {data, *upload}, upload, seen);
     } catch (const std::exception&) {
       return MHD_NO;
@@ -356,7 +356,7 @@ HttpServer::HttpServer(int port, HttpContent content) : parts_(std::make_unique<
 }
 
 HttpServer::~HttpServer() {
-  parts_->closing = true;  // so that nothing is suspended again: the daemon could not stop
+  parts_->closing = true;  // no stream is suspended again, or the daemon could not stop
   for (Parts::Stream& stream : parts_->streams) {
     if (stream.suspended) MHD_resume_connection(stream.connection);
     stream.suspended = false;

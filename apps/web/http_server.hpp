@@ -22,26 +22,25 @@ struct HttpContent {
   std::function<HttpAnswer(const std::string& path,
                            const std::map<std::string, std::string>& query)>
       answer;
-  /// Answers a POST of JSON; where this is empty, there is none. Nothing in the body is checked
-  /// yet.
+  /// Answers a POST of JSON; if empty, POST is refused. Nothing in the body is checked yet.
   std::function<HttpAnswer(const std::string& path, const std::string& body)> post;
-  std::string token;  ///< that a POST has to bring in the header X-Dashpot-Token
-  /// Returns the next text for every event stream, or null if there is nothing new. Streams stand
-  /// at "/stream"; where this is empty, there are none.
+  std::string token;  ///< that a POST must have in the header X-Dashpot-Token
+  /// Returns the next text for every event stream, or null if there is nothing new. Streams are at
+  /// "/stream"; if this is empty, there are none.
   std::function<std::shared_ptr<const std::string>()> next_event;
 };
 
 /// Serves requests on 127.0.0.1 alone, on one thread, by libmicrohttpd.
 ///
 /// Everything is bounded: kMostConnections connections, of them kMostStreams event streams; 32 KiB
-/// of memory for each connection; a request that is not complete after kRequestTime, and a client
+/// of memory for each connection; a request that is incomplete after kRequestTime, and a client
 /// that takes nothing for that long, are cut off. A new connection beyond the bound ends the oldest
-/// one that is no stream, so that neither many nor slow clients shut others out. A stream whose
-/// client is slow leaves out events: the latest one counts.
+/// connection other than a stream, so neither many nor slow clients shut others out. A stream with
+/// a slow client skips events: the latest one counts.
 ///
-/// A request is refused unless its Host is this server (which ends DNS rebinding), its Origin, if
-/// it has one, is this server's page, its method is GET, and it has no body. Where the content
-/// answers POSTs, one is taken with JSON of at most kMostBody bytes and the token of the content,
+/// A request is refused unless its Host is this server (which prevents DNS rebinding), its Origin,
+/// if it has one, is this server's page, its method is GET, and it has no body. If the content
+/// answers POSTs, a POST is accepted with JSON of at most kMostBody bytes and the content's token,
 /// which a page of another origin cannot read.
 class HttpServer {
  public:

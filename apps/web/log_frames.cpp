@@ -21,8 +21,8 @@ void hand_on(const lcmtypes::LogFile::Event& event, lcmtypes::MessageHandlers& h
   handlers.take(event.channel, event.data.data(), event.data.size());
 }
 
-/// Time of an event since the first, us. Times in a log may be anything: one that runs backward, or
-/// leaps by more than three years, counts as that of the event before.
+/// Time of an event since the first, us. Times in a log may be anything: if one runs backward, or
+/// leaps by more than three years, the time of the event before is returned.
 std::int64_t elapsed(std::int64_t utime, std::int64_t first, std::int64_t before) {
   constexpr std::int64_t kLongest = 100'000'000'000'000;
   const auto since = static_cast<std::int64_t>(static_cast<std::uint64_t>(utime) -
@@ -149,7 +149,7 @@ nlohmann::ordered_json LogFrames::history(std::size_t most) const {
     const Entry& entry = entries_[i];
     for (const auto& curve : entry.curves) {
       auto& of = modes[static_cast<int>(curve[0])];
-      if (modes.size() > 64) continue;  // a mode that is lost again and again changes its label
+      if (modes.size() > 64) continue;  // a mode that is lost repeatedly changes its label
       for (std::size_t k = 0; k < 2; ++k) {
         of[k].resize(times.size());
         of[k].emplace_back(curve[k + 1]);

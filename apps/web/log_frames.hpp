@@ -26,15 +26,15 @@ class LogFrames {
   const std::string& damage() const { return damage_; }
   std::int64_t malformed() const { return malformed_; }
 
-  /// Returns the frame after all messages up to `time`, s since the first event: the same as if the
-  /// log had been read from its beginning.
+  /// Returns the frame after all messages up to `time`, s since the first event, as if the log had
+  /// been read from its beginning.
   Frame at(double time);
   /// Returns curves of the whole log, at most about `most` points: {"time", "tick_time", "status",
-  /// "mode": {label: {"natural_frequency", "damping_ratio"}}}. Where a mode was not found, null.
+  /// "mode": {label: {"natural_frequency", "damping_ratio"}}}. Null: the mode was not found.
   nlohmann::ordered_json history(std::size_t most) const;
 
  private:
-  /// A place in the log with the frame before it. Large messages are not kept, but their places.
+  /// A place in the log with the frame before it. Of large messages only the places are kept.
   struct Entry {
     std::int64_t time = 0;  ///< since the first event, us
     std::uint64_t offset = 0;

@@ -8,15 +8,15 @@
 
 namespace dashpot::apps {
 
-/// A place of the arm that moves: the row d of its motion, and the joint motion that moves it by
-/// one unit, n each.
+/// A place on the arm: the row d of its motion, and the joint motion that moves it by one unit, n
+/// each.
 struct Place {
   Eigen::RowVectorXd row;
   Eigen::VectorXd motion;
   std::string unit;  ///< of its receptance
 };
 
-/// Returns J# = M^-1 J' (J M^-1 J')^-1; next to a singularity that of the directions left.
+/// Returns J# = M^-1 J' (J M^-1 J')^-1; near a singularity for the remaining directions.
 Eigen::MatrixXd consistent_inverse(const Eigen::MatrixXd& M, const Eigen::MatrixXd& J);
 
 /// Reads "tip/I" or "joint/I". Throws InputError.

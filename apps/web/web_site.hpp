@@ -13,17 +13,17 @@
 
 namespace dashpot::apps {
 
-/// The file of the page at a path ("/monitor/main.js"), and its type; nothing at any other path.
-/// They are part of the program.
+/// The file of the page at a path ("/monitor/main.js"), and its type; null at any other path. The
+/// files are part of the program.
 struct PageFile {
   std::string_view path, type, text;
 };
 const PageFile* find_page_file(std::string_view path);
 
-/// What the pages of `dashpot monitor --web` show: a live frame, or those of a log.
+/// Serves the pages of `dashpot monitor --web` with a live frame, or the frames of a log.
 class WebSite {
  public:
-  /// `source` is what the page calls it. Without `log` it is live. `identified` is the JSON of
+  /// `source` is its name on the page. Without `log` it is live. `identified` is the JSON of
   /// measured modes, or null.
   WebSite(std::string source, std::optional<ArmView> arm, std::unique_ptr<LogFrames> log,
           nlohmann::ordered_json identified);
@@ -35,7 +35,7 @@ class WebSite {
     frame_.take(message);
     came_at_ = std::chrono::steady_clock::now();
   }
-  /// Whatever it does, it cannot change what the server shows. On the server's thread.
+  /// A request cannot change what the server shows. On the server's thread.
   HttpAnswer answer(const std::string& path, const std::map<std::string, std::string>& query);
   /// The next event, or null if there was no message since the last one and a second has not
   /// passed. On the server's thread.

@@ -126,7 +126,7 @@ class Browser:
     def errors(self):
         """Returns what went wrong on the page: exceptions, errors in the log, refused resources.
 
-        A connection that the server ends is none.
+        A connection that the server ends does not count.
         """
         found = list(self.value('window.dashpot ? window.dashpot.errors : []'))
         for event in self.events:

@@ -153,7 +153,7 @@ class TuneServer(unittest.TestCase):
             self.assertAlmostEqual(mode['damping_ratio'], 0.7, places=5)
         hard = self.server.design(friction | {'gain_margin': 2, 'period': 0.01, 'delay': 3,
                                               'stiffness': [3000] * 3 + [300] * 3})
-        self.assertLess(hard['smallest_ratio'], 0.65)  # lowered to what this loop bears
+        self.assertLess(hard['smallest_ratio'], 0.65)  # lowered to what this loop allows
 
     def test_level_of_a_ratio_is_that_of_a_run(self):
         folder = tempfile.mkdtemp(prefix='dashpot-tune-')
@@ -403,13 +403,13 @@ class TuneServer(unittest.TestCase):
                             'Content-Type: application/json\r\nContent-Length: 5\r\n'
                             'Transfer-Encoding: chunked\r\n\r\n').encode())
             self.assertIn(b' 411 ', chunks.recv(100))
-        # What only the making of a controller shows is refused as well.
+        # Faults that only a controller's constructor finds are refused as well.
         bending = self.base | {'arm': {'reflected_inertia': [0.3] * 7, 'gear_stiffness': [1e4] * 7,
                                        'gear_damping': [1] * 7, 'position_sensor': 'link'}, 'period': 1e-3}
         status, answer = post('/design', good | {'design': bending})
         self.assertEqual(status, 200, answer)
         self.assertIn('limits.stopping_time', json.dumps(answer['refused']))
-        # A body that is announced and does not come keeps nobody else waiting.
+        # An announced body that does not come does not delay other requests.
         with socket.create_connection(self.server.host.split(':')) as slow:
             slow.sendall((f'POST /design HTTP/1.1\r\nHost: {self.server.host}\r\nX-Dashpot-Token: {token}\r\n'
                           'Content-Type: application/json\r\nContent-Length: 500\r\n\r\n{').encode())

@@ -237,7 +237,7 @@ class Tune(unittest.TestCase):
                     told = run_python(python)
                     if told is not None:
                         self.same_modes(told, modes)
-                    self.assertIn(f'These keys take the place of those of {path}', text)
+                    self.assertIn(f'These keys replace keys of {path}', text)
                     self.assertIn('gain_margin: 1.5', text)
                     self.assertNotIn('integral', text)
                     self.assertNotIn('cutoff', text)
@@ -284,7 +284,7 @@ class Tune(unittest.TestCase):
         self.assertIn('is unstable here', self.value("$('#refused').textContent"))
         self.edit("state.a.stiffness = [200, 200, 200, 20, 20, 20]; state.a.gain_margin = 1.2")
         level = self.value('dashpot.answers.a.damping_level')
-        self.assertIn(f"The ratio of A is lowered to {shown(100 * level['share'], 2)} % where the loop bears least",
+        self.assertIn(f"The ratio of A is lowered to {shown(100 * level['share'], 2)} % by the gain margin of the loop",
                       self.value(words))
         self.assertNotIn('unstable', self.value(words))
 
@@ -294,7 +294,7 @@ class Tune(unittest.TestCase):
         self.assertFalse(self.value('dashpot.setup.rotors_unknown'))
         self.same_modes(self.audited(['0.5,0,0,0.1']), self.value('dashpot.answers.a.modes'))
         self.assertIn('payload: {"mass":0.5,"center":[0,0,0.1]}', self.text('configuration of Dashpot'))
-        for options in (['--drives', 'nobody'], ['--payload', '-1']):
+        for options in (['--drives', 'unknown'], ['--payload', '-1']):
             done = subprocess.run([PROGRAM, 'tune', '--port', '0', *options], capture_output=True, text=True,
                                   cwd=SOURCE)
             self.assertEqual((done.returncode, options[0] in done.stderr), (2, True), done.stderr)
@@ -315,7 +315,7 @@ class Tune(unittest.TestCase):
         self.assertNotIn('first joint', crisp + other)
         self.edit("state.a.null_stiffness = [9, 4, 4, 4, 4, 4, 4]; state.a.null_damping = {ratio: 0.6}")
         other = self.text('Cartesian-Impedance-Controller')
-        for words in ('nullspace_stiffness: 9', 'nullspace_damping_factor: 0.6', 'that of the first joint is given',
+        for words in ('nullspace_stiffness: 9', 'nullspace_damping_factor: 0.6', 'the first joint',
                       'has no counterpart there'):
             self.assertIn(words, other)
         self.edit("state.a.damping = {ratio: 0.7}")
@@ -477,7 +477,7 @@ class Tune(unittest.TestCase):
         for damping in ('[40, 40, 40, 3, 3, 3]', '{ratio: 0.3}'):
             self.edit("state.edited = 'a'; state.a = {...state.a, stiffness: [400, 400, 400, 30, 30, 30], "
                       f"damping: {damping}, arm: {gears}}}")
-            # The slowest mode; those of the gears move too little to be shown.
+            # The slowest mode; the ratios of gear modes change too little to be shown.
             last = self.value('dashpot.answers.a.modes.length')
             self.set('#arrow_mode', str(last))
             before = self.value('dashpot.answers.a.modes.at(-1).damping_ratio')

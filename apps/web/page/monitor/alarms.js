@@ -40,7 +40,7 @@ export function fillAlarms(page) {
   setText('worst', posture ? `smallest ratio at --q ${posture}` : '');
 }
 
-/// Lets a button copy the worst posture, or select it where the browser does not allow to copy.
+/// Lets a button copy the worst posture, or select it if the browser does not allow copying.
 export function copyWorstPosture(page) {
   listen('click', {copy: async () => {
     try {
@@ -70,7 +70,7 @@ export function fillLoopNumbers(page, rate) {
       `${level < 1 ? `, lowered to ${number(level, 3)} of it` : ''}` : 'given as numbers'],
     ['payload', `${fixed(state.payload_mass, 3)} kg`],
     ['commands', `${state.commands_accepted} accepted, ${state.commands_rejected} refused; ` +
-      `${state.commander ? `sender ${state.commander} commands` : 'nobody commands'}`]]);
+      `${state.commander ? `sender ${state.commander} commands` : 'no commander'}`]]);
 }
 
 export function fillSampledNumbers({frame: {sampled}, setup: {arm}}, period) {
@@ -78,7 +78,7 @@ export function fillSampledNumbers({frame: {sampled}, setup: {arm}}, period) {
   fillPairs('sampled', !sampled ? [['sampled loop', 'not analysed']] : [
     ['gain margin', sampled.gain_margin === null ? '∞' : `${number(sampled.gain_margin, 3)} ×`],
     ['largest |z|', fixed(sampled.spectral_radius, 6)],
-    ...(missing ? [['rotors unknown', `${missing}: the margin is that of an arm without rotors`]] : []),
+    ...(missing ? [['rotors unknown', `${missing}: the margin is computed for an arm without rotors`]] : []),
     ...(assumed.length ? [['assumes', assumed.join(', ')]] : []),
     ['period', period ? `${number(1e3 * period, 3)} ms` : kNone]]);
 }

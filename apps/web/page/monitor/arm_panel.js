@@ -1,4 +1,4 @@
-// The arm with the shape of the chosen mode, which swings.
+// The arm with the swinging shape of the chosen mode.
 import {$, setText} from '../shared/dom.js';
 import {degrees, fixed, number} from '../shared/numbers.js';
 import {reducedMotion} from '../shared/theme.js';
@@ -14,7 +14,7 @@ export function shapes({frame: {modes}, response}) {
     ...zero.map((label) => ({label, text: label}))];
 }
 
-/// The shape of the chosen mode just now, as ArmView takes it, with its frequency; or null.
+/// The present shape of the chosen mode for ArmView, with its frequency; or null.
 function swing({chosen, frame: {modes}, response}) {
   if (chosen === null) return null;
   const phase = 2 * Math.PI * value('pace') * (reducedMotion() ? 0 : performance.now() * 1e-3);

@@ -1,4 +1,4 @@
-// Messages from the program: what it is started with, then frames as a stream, or those of a log.
+// Messages from the program: its set-up, then frames as a stream, or the frames of a log.
 import {Replay} from './replay.js';
 
 export async function get(path) {
@@ -7,7 +7,7 @@ export async function get(path) {
   return body;
 }
 
-/// Calls `heard`: linked(whether, in words), begin(setup) when the program is reached, history(curves) of a log, and
+/// Calls `heard`: linked(whether, text), begin(setup) when the program is reached, history(curves) of a log, and
 /// take(frame).
 export class Connection {
   constructor(heard) { Object.assign(this, {heard, connected: false, replay: new Replay()}); }

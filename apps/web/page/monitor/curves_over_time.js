@@ -7,8 +7,7 @@ import {isGap, timeOf, wantedRatio} from './loop_state.js';
 const kMinute = 60;    // s of curves that a live page keeps
 const kCurves = ['natural_frequency', 'damping_ratio'];
 
-/// Values at times: `mode` is label -> {natural_frequency, damping_ratio}, lists as long as `time`, null where a mode
-/// was not there.
+/// Values at times: `mode` is label -> {natural_frequency, damping_ratio}, lists as long as `time`; null: no such mode.
 export class History {
   constructor(time = [], tick = [], status = [], mode = new Map()) { Object.assign(this, {time, tick, status, mode}); }
 
@@ -57,7 +56,7 @@ export function drawCurves(page, {frequency, ratio, ticks}, history, period) {
   legends([...mode.keys()].sort((a, b) => a - b), wanted > 0, (setup.identified || []).length > 0);
 }
 
-/// Where the status changes to ok or from it.
+/// The times at which the status changes to ok or from it.
 function strip(time, status) {
   const all = status.map((s, i) => ({x: time[i], colour: s ? 'bad' : 'good'}));
   return all.filter(({colour}, i) => !i || i + 1 === all.length || colour !== all[i - 1].colour);

@@ -1,4 +1,4 @@
-// What the frame that is shown says of the loop: time, age, posture, poles, forces, gains.
+// The state of the loop in the frame that is shown: time, age, posture, poles, forces, gains.
 
 const kSilent = 2;  // s without a message
 
@@ -6,7 +6,7 @@ const kSilent = 2;  // s without a message
 export const timeOf = (page, frame = page.frame) =>
   (page.setup.live ? (frame.utime - page.start) * 1e-6 : page.replay.time);
 
-/// How the loop is: 'waiting' for a first message, 'running', 'silent', 'gone' with the server, 'log'.
+/// 'waiting' for a first message, 'running', 'silent', 'gone' with the server, or 'log'.
 export function loopState(page) {
   if (!page.connected) return 'gone';
   if (!page.frame.messages) return 'waiting';
@@ -29,13 +29,13 @@ export function springForce({frame: {state}}) {
   return force.includes(null) ? null : force;
 }
 
-/// The damping ratio wanted just now: what the loop says it designs for, or else the configuration.
+/// The present damping ratio wanted: of the loop's messages, or else of the configuration.
 export function wantedRatio({setup, frame: {state}}) {
   if (state) return state.mode === 0 ? state.joint_damping_ratio : state.task_damping_ratio;
   return setup.wanted_ratio.cartesian;
 }
 
-/// The eigenvalues of the modes, as PoleMap takes them.
+/// The eigenvalues of the modes for PoleMap.
 export function polesOf({frame: {modes}}) {
   return (modes ? modes.label : []).flatMap((label, i) => [0, 1].map((which) => ({label, which,
     re: modes.eigenvalue_real[i][which], im: modes.eigenvalue_imag[i][which], bound: modes.eigenvalue_bound[i]})))
@@ -50,7 +50,7 @@ export function identifiedPoles({identified}) {
   });
 }
 
-/// Why the arm of the configuration cannot be drawn: said once, in the middle of its panel.
+/// Why the arm of the configuration cannot be drawn.
 export function otherJoints({setup: {arm}, frame: {state, modes}}) {
   const n = (state || modes || {n: 0}).n;
   if (!n || !arm || n === arm.joints.length) return '';
@@ -58,7 +58,7 @@ export function otherJoints({setup: {arm}, frame: {state, modes}}) {
   return `other joints: the loop has ${n}, ${own}.\nStart with the --config of this loop.`;
 }
 
-/// Whether the modes that the loop has are those of the configuration's gains.
+/// Whether the modes of the loop match the configuration's gains.
 export function hasGainsOfConfiguration({frame: {modes}, response}) {
   if (!modes || !response || modes.natural_frequency.length !== response.natural_frequency.length) return !modes;
   const sorted = (list) => list.filter((v) => v !== null).sort((a, b) => a - b);
@@ -68,7 +68,7 @@ export function hasGainsOfConfiguration({frame: {modes}, response}) {
   });
 }
 
-/// Ticks in a second, from ticks and times of the states that came.
+/// Ticks in a second, from ticks and times of the states.
 export class TickRate {
   first = null;
   rate = null;

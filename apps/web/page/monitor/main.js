@@ -1,4 +1,4 @@
-// The page of `dashpot monitor --web`: takes frames from the program and has drawn again what changed.
+// The page of `dashpot monitor --web`: takes frames from the program and redraws what changed.
 import {ArmView} from '../shared/arm_view.js';
 import {$, keepErrors, listen, setText} from '../shared/dom.js';
 import {fillChips} from '../shared/mode_marks.js';
@@ -19,7 +19,7 @@ import {fillJointTable, fillModeTable} from './tables.js';
 
 const kEvery = {arm: 140, poles: 240, numbers: 330, curves: 950};  // ms between drawings, if only time goes on
 const kRate = 25;  // drawings in a second
-const kRestart = 1e6;  // us that time goes back when another loop, or the same one, has started
+const kRestart = 1e6;  // us: if time goes back further, a loop has started
 
 /// `latest` is the frame that came last, `frame` the one that is shown.
 class Page {
@@ -107,7 +107,7 @@ class Page {
     const eigenvalues = modes && [modes.eigenvalue_real, modes.eigenvalue_imag, sampled && sampled.sequence];
     if (this.differs('poles', eigenvalues, 3)) this.redraw.later('poles');
   }
-  /// Whether numbers are others than the last time, as far as anyone would see.
+  /// Whether numbers differ visibly from the last time.
   differs(part, numbers, digits) {
     const decimals = (x) => Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(x) + .1)));
     const key = numbers ? numbers.flat(3).map((x) => (x ? x.toFixed(decimals(x)) : x)).join() : 'none';

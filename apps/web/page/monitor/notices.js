@@ -1,4 +1,4 @@
-// What is wrong with the loop, and what to do: a fault that has latched, silence, modes that lag.
+// Faults of the loop, and what to do: a latched fault, silence, modes that lag.
 import {$, element, set, setText} from '../shared/dom.js';
 import {fixed} from '../shared/numbers.js';
 import {ageText, isGap, loopState, timeOf} from './loop_state.js';
@@ -14,7 +14,7 @@ const kFaults = {
   'loop at the wrong rate': 'The host calls the loop at another rate than control.period says. Make both agree.',
   collision:
     'Free the arm, look for the cause, then release. If nothing was touched, the model lacks friction or a payload: ' +
-    'dashpot check-model tells.',
+    'dashpot check-model shows which.',
   vibration:
     'Gains are too stiff for this posture, delay or gears, or something shakes the arm. Lower the stiffness or look ' +
     'at the gain margin before you release.',
@@ -33,12 +33,12 @@ const kFaults = {
   'time not after the last': 'Time stamps stand still or go backward. Use a monotonic clock of the robot.',
   'the brake does not stop the arm':
     "Engage the robot's brakes now. Check signs and units of torques, and the model's masses, before you release.",
-  'state not finite': 'The host passes on a number that is none. Check the driver and filters of the velocity.',
+  'state not finite': 'The host passes on NaN or infinity. Check the driver and filters of the velocity.',
   'state of wrong size':
     'The host passes on another number of joints than the model has. Check base and tip in the configuration.',
   'state jumped':
-    'A position leapt farther than the robot moves: an encoder slipped or wrapped, or states were lost. Look at it.',
-  'torque not finite': 'Gains or set-points gave a number that is none. Report it with the log and the configuration.',
+    'A position jumped further than the robot can move. Check encoders for slip or wrap, and whether states were lost.',
+  'torque not finite': 'Gains or set-points gave NaN or infinity. Report it with the log and the configuration.',
 };
 export const faultAdvice = (text) => Object.entries(kFaults).find(([begin]) => text.startsWith(begin))?.[1] ||
   'Find out what happened before you release.';
@@ -54,7 +54,7 @@ function fillNotice(id, {title, rows, link} = {}) {
     link ? element('a', {href: link.href, target: '_blank', rel: 'noopener'}, link.text) : '']));
 }
 
-/// What is to be said while nothing is heard, or modes are old.
+/// The notice while no messages come, or modes are old.
 function silence(page, now, lag) {
   if (now === 'gone') {
     return {title: `No connection to the monitor: what is shown is ${ageText(page)} old`,
@@ -80,7 +80,7 @@ const fault = ({fault_text: text, fault_tick: tick}) => ({title: `Fault: ${text}
     'The brake acts until dashpot_release, dashpot_reset, or dashpot command --release.'],
   link: {text: 'docs/safety.md: faults', href: '/safety.md'}});
 
-/// Whether messages come: the badge in the header.
+/// The badge in the header: whether messages come.
 export function showLink(page, now = 'waiting') {
   const waits = now === 'waiting' && page.connected, kinds = {running: 'good', log: page.setup?.damage ? 'bad' : ''};
   setText('link', now === 'silent' ? `silent for ${ageText(page)}`
@@ -88,7 +88,7 @@ export function showLink(page, now = 'waiting') {
   $('link').className = `badge ${kinds[now] ?? (waits ? '' : 'bad')}`;
 }
 
-/// Shows how the loop is: badges, clock, notices, and what is pale because it is old.
+/// Shows the state of the loop: badges, clock, notices, and pale parts that are old.
 export function showLoopState(page) {
   const {frame} = page, {state, modes} = frame, now = loopState(page), quiet = now === 'silent' || now === 'gone';
   const lag = state && modes ? (state.utime - modes.utime) * 1e-6 : 0, faulty = state && state.fault;

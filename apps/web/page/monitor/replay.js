@@ -1,4 +1,4 @@
-// Replay of a log: one request at a time, always for the time that it is then.
+// Replay of a log: one request at a time, always for the present time.
 import {$, listen, setText} from '../shared/dom.js';
 import {fixed} from '../shared/numbers.js';
 
@@ -39,7 +39,7 @@ export class Replay {
     setText('time_text', `${fixed(this.time, 2)} s`);
   }
 
-  /// Asks `frameAt` for the frame of each time, which returns whether it came.
+  /// Asks `frameAt` for the frame of each time; it returns whether the frame came.
   async run(end, frameAt) {
     $('replay').hidden = false;
     $('time').max = this.end = end;

@@ -1,4 +1,4 @@
-// The receptance of the loop at its posture, asked for at most once a second, where an arm is known and has moved.
+// The receptance of the loop at its posture, asked for at most once a second, if an arm is known and has moved.
 import {$, setText} from '../shared/dom.js';
 import {drawResponses} from '../shared/response_plots.js';
 import {get} from './connection.js';
@@ -8,7 +8,7 @@ export class ResponsePanel {
   asked = '';
   note = '';
 
-  /// `changed` is called when there is another `page.response`, or another reason why there is none.
+  /// `changed` is called when `page.response`, or the reason for its absence, changes.
   constructor(page, plots, changed) {
     Object.assign(this, {page, plots, changed});
     setInterval(() => this.ask(), 1000);

@@ -6,7 +6,7 @@ import {colour} from '../shared/theme.js';
 
 const kLeft = 38, kRight = 20, kBottom = 18;  // margins, px
 
-/// Sampled poles z = exp(l T), as close to z = 1 as they are.
+/// Sampled poles z = exp(l T), accurate near z = 1.
 export function sampledPoles(sampled, period) {
   if (!sampled || !(period > 0)) return [];
   return sampled.natural_frequency.flatMap((w, i) => {
@@ -55,7 +55,7 @@ export function drawCircle(canvas, poles) {
   line(c, kLeft, 0, kLeft, bottom);
   line(c, kLeft, bottom, w, bottom);
   c.textAlign = 'center';
-  // Numbers of the axis: how far left of z = 1, because what differs lies in its last digits.
+  // Numbers of the axis are distances from z = 1, because z itself differs in its last digits.
   for (const v of ticks(0, (x0 - kLeft - 6) / k, (w - 40) / 70)) {
     const x = toX(1 - v), text = v ? `1−${tickText(v)}` : '1';
     line(c, x, bottom, x, bottom + 3);

@@ -7,8 +7,8 @@ import {wantedRatio} from './loop_state.js';
 const kSoft = 5;  // kind of a mode without a spring of its own
 const kOrigins = ['tracked', 'reused', 'solved directly'];
 
-/// How a damping ratio is to be judged: 'good', 'bad', or '' where no ratio is wanted. Friction and rounding may take
-/// 5 % of it.
+/// The judgement of a damping ratio: 'good', 'bad', or '' if no ratio is wanted. Friction and rounding may take 5 % of
+/// it.
 export function judge(ratio, wanted) {
   if (ratio === null) return 'none';
   if (!(ratio > 0)) return 'bad';

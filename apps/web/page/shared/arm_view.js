@@ -9,7 +9,7 @@ import {colour} from './theme.js';
 const kSides = 14;  // of a joint's cylinder
 const kFrameColours = ['#d55e00', '#009e73', '#0072b2'];
 
-/// `changed` is called when the arm has to be drawn again because of pointer or keys.
+/// `changed` is called when pointer or keys require the arm to be drawn again.
 export class ArmView {
   constructor(canvas, changed = () => {}) {
     Object.assign(this, {canvas, turn: 0.75, tilt: 0.32, zoom: 1, reach: 0});

@@ -42,7 +42,7 @@ export function cross(c, x, y, r) {
   line(c, x - r, y + r, x + r, y - r);
 }
 
-/// Text in the middle of a drawing that has nothing to show.
+/// Text in the middle of an empty drawing.
 export function say(c, w, h, text) {
   c.fillStyle = colour('soft');
   c.textAlign = 'center';

@@ -1,4 +1,4 @@
-// Elements of a page: found by id, made, and written to only where something changes.
+// Elements of a page: found by id, made, and written to only if something changes.
 
 export const $ = (id) => document.getElementById(id);
 
@@ -37,7 +37,7 @@ export function fillPairs(id, items) {
   fill(id, JSON.stringify(items), () => items.flat().map((text, i) => element(i % 2 ? 'dd' : 'dt', {}, text)));
 }
 
-/// Keeps what goes wrong on the page.
+/// Keeps the errors of the page.
 export function keepErrors(errors) {
   window.addEventListener('error', (e) => errors.push(e.message));
   window.addEventListener('unhandledrejection', (e) => errors.push(String(e.reason)));

@@ -1,4 +1,4 @@
-// Where the parts of an arm are, from the chain that /setup gives and a posture; vectors and 4 x 4 matrices.
+// The poses of an arm's parts, from the chain of /setup and a posture; vectors and 4 x 4 matrices.
 
 export const kAxes = [0, 1, 2];
 const kIdentity = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]];

@@ -38,12 +38,12 @@ export class Plot {
     }, {step: 1.5});
   }
   width() { return Math.max(1, this.canvas.clientWidth - kLeft - kRight); }
-  /// What is shown of the horizontal axis, which has a range.
+  /// The visible part of the horizontal axis, which has a range.
   shown(range) {
     const {shown} = this.view;
     return shown && shown[0] < range[1] && shown[1] > range[0] ? shown : range;
   }
-  /// What is shown of the horizontal axis, and all of it, as the axis counts: logarithms, if it has them.
+  /// The visible part of the horizontal axis, and all of it; in logarithms on a logarithmic axis.
   spans() {
     const {log, range} = this.drawn, counted = (ends) => ends.map((v) => forward(log, v));
     return {log, shown: counted(this.shown(range)), range: counted(range)};
@@ -149,7 +149,7 @@ export class Plot {
     });
   }
 
-  /// Range and kind of the vertical axis for what is visible, or null if nothing is.
+  /// Range and kind of the vertical axis for the visible part, or null if nothing is visible.
   vertical({y, curves = [], levels = []}, [from, to]) {
     if (y.range) return y;
     let low = Infinity, high = -Infinity, negative = false;
@@ -201,7 +201,7 @@ export class Plot {
     for (const [px, py] of marks) drawMark(c, label, px, py, width > 2 ? 5 : 3.6);
   }
 
-  /// The values at `at`, beside the pointer: those of the nearest points, highest first.
+  /// The values of the points nearest to `at`, highest first, beside the pointer.
   hover(at, {x: {reach = Infinity, text = ''}, curves = []}, px, [from, to]) {
     const rows = [];
     for (const {x, y, label, name, unit = ''} of curves) {

@@ -1,4 +1,4 @@
-// When parts of a page are drawn again.
+// Schedules the drawing of parts of a page.
 
 /// `parts` are {name: function of the time that draws it}. `every` are ms between drawings of a part if only time goes
 /// on, `rate` drawings a second at most; nothing is drawn unless `ready`; `drawn` is called after each drawing.

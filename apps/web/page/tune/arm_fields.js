@@ -1,4 +1,4 @@
-// The fields of the posture, of the loop, and of what the arm has besides: payload, rotors, gears, friction.
+// The fields of the posture, the loop and the arm: payload, rotors, gears, friction.
 import {$} from '../shared/dom.js';
 import {isNumber, plain} from '../shared/numbers.js';
 import {at, readNumbers, textInput} from './form_fields.js';

@@ -1,4 +1,4 @@
-// The table of both designs' modes, their numbers beside each other, and what is to be said of their loops.
+// The table of both designs' modes, their numbers beside each other, and notes on their loops.
 import {$, element} from '../shared/dom.js';
 import {markElement} from '../shared/mode_marks.js';
 import {isNumber, number} from '../shared/numbers.js';
@@ -21,7 +21,7 @@ const cell = (text, kind) => element('td', {class: kind || undefined}, text);
 const difference = (a, b) => (isNumber(a) && isNumber(b) ? (b > a ? '+' : '') + number(b - a, 3) : number(null));
 const unstable = ({gain_margin: margin}) => margin !== null && margin < 1;
 
-/// The cells of a mode's frequency and ratio; a ratio is good where the loop is stable and the posture not singular.
+/// The cells of a mode's frequency and ratio; a ratio is good only if the loop is stable and the posture not singular.
 function modeCells(mode, answer) {
   if (!mode) return [cell(number(null)), cell(number(null))];
   const ratio = mode.damping_ratio, usable = !unstable(answer) && !answer.refused.some(({key}) => key === 'q');
@@ -29,7 +29,7 @@ function modeCells(mode, answer) {
   return [cell(number(mode.natural_frequency)), cell(number(ratio), kind)];
 }
 
-/// Which parts of the arm the two designs do not share.
+/// The parts of the arm in which the two designs differ.
 function differentParts({setup, state}) {
   const told = (name, key) => {
     const value = (state[name].arm || {})[key] || setup.robot.keys[key] || setup.model[key] || null;
@@ -41,17 +41,17 @@ function differentParts({setup, state}) {
   return Object.keys(kArmKeys).filter(differs).map((key) => kArmKeys[key]);
 }
 
-/// What is to be said of the sampled loop of a design, and of its ratio there.
+/// Notes on the sampled loop of a design, and on its ratio there.
 function loopWords(name, found) {
   if (!found) return [];
   const {limit, damping_level: level, assumes} = found;
   return [
     unstable(found) &&
-      `${name} is unstable in the sampled loop, so that its ratios and its motion are none that an arm would show`,
+      `${name} is unstable in the sampled loop: an arm would not show its ratios and its motion`,
     level && !level.kept && `No share of the ratio of ${name} leaves the loop the margin asked for: ` +
       'its springs are too stiff, or the ratio too small for them',
     level && level.share < 0.995 &&
-      `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % where the loop bears least`,
+      `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % by the gain margin of the loop`,
     assumes.length > 0 && `The loop of ${name} assumes: ${assumes.join(', ')}`,
     limit && `${name} is limited by a motion at ${number(limit.frequency, 3)} rad/s` +
       `${limit.joint ? `, most of it in ${limit.joint}` : ''}`].filter(Boolean);

@@ -7,7 +7,7 @@ import {diagonal, isDiagonal} from './matrices.js';
 
 const round = (x) => rounded(x, 7);
 const decimal = (x) => (Number.isInteger(x) ? `${x}.0` : String(x));
-/// Whether entries beside the diagonal are more than rounding.
+/// Whether entries off the diagonal are more than rounding.
 const isLost = (matrix) => matrix && !isDiagonal(matrix, 1e-9 * Math.max(...diagonal(matrix).map(Math.abs)));
 
 /// Writes {k, d, note}, the diagonals of the task's gains and what is lost with them, by `write` for a controller.
@@ -18,13 +18,13 @@ const forTask = (name, write) => (of) => {
   }
   const lost = isLost(damping) || isLost(stiffness);
   return write(of, diagonal(stiffness).map(round), diagonal(damping).map(round),
-    lost && 'This form has no entries beside the diagonal: the modes differ from those on the page.');
+    lost && 'This form has no entries off the diagonal: the modes differ from those on the page.');
 };
 
 function nullSpaceNote({null_stiffness: stiffness, null_damping: damping}) {
   const differ = (all) => Array.isArray(all) && all.some((x) => x !== all[0]);
   return (differ(stiffness) || differ(damping)) &&
-    'The null space has one stiffness there: that of the first joint is given.';
+    'The null space has one stiffness there: here it comes from the first joint.';
 }
 
 export const crisp = forTask('crisp', ({design}, k, d, lost) => {
@@ -46,7 +46,7 @@ export const cartesianImpedance = forTask('Cartesian-Impedance-Controller', ({q,
   return notes([lost,
     [...factors, factor].some((f) => f > 1) && 'It takes damping factors from 0 to 1: those above are cut off there.',
     nullSpaceNote(design), ratio && own > 0 &&
-      'A damping ratio of the null space has no counterpart there: the factor is that of an inertia of 1 kg m^2.',
+      'A damping ratio of the null space has no counterpart there: the factor is for an inertia of 1 kg m^2.',
     'A message cartesian_impedance_controller/ControllerConfig for set_config.']) +
     `cartesian_stiffness:${wrench(k)}cartesian_damping_factors:${wrench(factors)}nullspace_stiffness: ${own}\n` +
     `nullspace_damping_factor: ${factor}\nq_d_nullspace: [${q.join(', ')}]\n`;

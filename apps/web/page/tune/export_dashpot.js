@@ -1,4 +1,4 @@
-// A design as a text for Dashpot. `of` is {setup, q, design, answer}: what the program was asked, and what it said.
+// A design as a text for Dashpot. `of` is {setup, q, design, answer}: the request and the program's answer.
 import {rounded} from '../shared/numbers.js';
 import {compact, diagonal, isDiagonal} from './matrices.js';
 
@@ -6,13 +6,12 @@ const kDiffers = 'the modes differ from those on the page.';
 const json = JSON.stringify;
 export const notes = (lines) => lines.filter(Boolean).map((line) => `# ${line}\n`).join('');
 
-/// The damping of the null space that acts, where it is no ratio.
+/// The damping that acts in the null space, if it is not given by a ratio.
 export function nullDamping({null_damping: damping, null_stiffness: stiffness}) {
   return Array.isArray(damping) ? damping : stiffness.map((k) => (damping.factor || 0) * Math.sqrt(k));
 }
 
-/// What the keys of a configuration's `robot` say of the arm: as the program was started, and what the page has in
-/// their place.
+/// The arm as keys of a configuration's `robot`: from the start of the program, with the changes of the page.
 function armKeys({setup, design}) {
   const arm = design.arm || {}, keys = {...setup.robot.keys};
   for (const [key, value] of Object.entries(arm)) {
@@ -23,7 +22,7 @@ function armKeys({setup, design}) {
   return keys;
 }
 
-/// The rotors' inertia that acts, or null where there is none.
+/// The inertia that acts of the rotors, or null if there is none.
 function rotors({setup, design}) {
   const told = design.arm?.reflected_inertia, left = setup.robot.keys.torque_loop_inertia_ratio;
   const acts = told ? told.map((x, i) => (left ? rounded(x * left[i], 7) : x)) : setup.model.reflected_inertia;
@@ -52,7 +51,7 @@ export function configuration(of) {
   const lines = Object.entries(sections).map(([key, value]) => [key, Object.entries(value)])
     .filter(([, inner]) => inner.length)
     .map(([key, inner]) => `${key}:\n${inner.map(([name, value]) => `  ${name}: ${json(value)}\n`).join('')}`);
-  return notes([config && `These keys take the place of those of ${config}, which keeps its others.`, `q: ${json(q)}`,
+  return notes([config && `These keys replace keys of ${config}, which keeps its other ones.`, `q: ${json(q)}`,
     ...refused]) + lines.join('');
 }
 
@@ -63,7 +62,7 @@ export const matrices = ({answer}) => `${json(answer.system, null, 1)
 /// A word for a shell.
 const quoted = (word) => (/^[\w./:,=@%+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 
-/// Options of the programs that tell the arm.
+/// Options of the programs for the arm.
 function armOptions(of) {
   const {robot: {urdf, base, tip}, model} = of.setup, keys = armKeys(of), accepted = keys.accept_inertias;
   const {mass, center, inertia: I} = keys.payload || {};

@@ -1,5 +1,5 @@
 // Fields of a form: a slider beside a number with its unit, choices, lists, matrices. Each has refresh(), which shows
-// the value as it is.
+// the present value.
 import {button, element} from '../shared/dom.js';
 import {number, plain, rounded} from '../shared/numbers.js';
 
@@ -30,11 +30,11 @@ function readNumber(text, unit) {
 let notes = 0;
 const makeNote = () => element('span', {class: 'wanted', role: 'status', id: `wanted${++notes}`});
 
-/// An input for a text that `take` takes, which returns whether it could. A text that is not taken stays, marked, with
-/// `wanted` in the note beside it until the value `get()` is another one. refresh() writes `text` of the value, unless
-/// the input has such a text or is being written.
+/// An input whose text goes to `take`, which returns whether it is valid. An invalid text stays, marked, with `wanted`
+/// in the note beside it until the value `get()` changes. refresh() writes `text` of the value, unless the input has
+/// an invalid text or is being edited.
 export function textInput(input, {wanted, get, take, text, note = makeNote()}) {
-  let wrong = null;  // the value beside which a text was not taken
+  let wrong = null;  // the value when a text was invalid
   const mark = (bad) => {
     wrong = bad ? JSON.stringify(get()) : null;
     input.setAttribute('aria-invalid', bad);
@@ -53,7 +53,7 @@ const textAttributes = (label, more) => ({type: 'text', autocomplete: 'off', 'ar
 const frame = (label, key, ...children) =>
   element('label', {class: 'field', 'data-key': key}, element('span', {}, label), ...children);
 
-/// Makes fields; `edit` takes what changes a value, and whether the change has ended.
+/// Makes fields; `edit` takes a function that changes a value, and whether the change has ended.
 export class Form {
   constructor(edit) { this.edit = edit; }
 
@@ -135,5 +135,5 @@ export class Form {
   }
 }
 
-/// What get and set of a field are for a value that stands in `object()` at a key.
+/// get and set of a field for the value of a key in `object()`.
 export const at = (object, key, usual) => ({get: () => object()[key] ?? usual, set: (x) => { object()[key] = x; }});

@@ -13,18 +13,18 @@ const kUsual = {ratio: {ratio: 0.7}, factor: {factor: 2}};
 const kRatio = ['ratio', 'damping ratio'], kFactor = ['factor', 'factor of √stiffness'];
 const kDiagonal = ['diagonal', 'diagonal'], kFull = ['full', 'full matrix'];
 
-/// The words on which the form's fields depend; where they change, it is built again.
+/// The words on which the form's fields depend; if they change, it is built again.
 export function structure(design) {
   const gains = [design.stiffness, design.joint_stiffness, design.damping, design.joint_damping, design.null_damping];
   return [design.mode, ...gains.map(kindOf)].join();
 }
 
-/// A slider of the ratio or factor that damping is given by.
+/// A slider of the ratio or factor that gives the damping.
 const relative = (form, design, key, kind, unit) => form.slider({label: kind, key,
   ...(kind === 'ratio' ? {unit: '', low: 0.05, high: 2} : {unit, low: 0, high: 6}),
   get: () => design()[key][kind], set: (x) => { design()[key] = {[kind]: x}; }});
 
-/// Stiffness and damping of task or joints, `names` and `ranges` of whose entries are given.
+/// Stiffness and damping of task or joints; `names` and `ranges` belong to the entries.
 function pair(form, page, {stiffness, damping, names, ranges}) {
   const design = () => page.design(), kind = kindOf(design()[damping]);
   const entries = (key, label, units) => (kindOf(design()[key]) === 'full'

@@ -1,4 +1,4 @@
-// The page of `dashpot tune`: fields of two designs, and drawings of what the program says of them.
+// The page of `dashpot tune`: fields of two designs, and drawings of the program's answers.
 import {ArmView} from '../shared/arm_view.js';
 import {$, fillPairs, listen} from '../shared/dom.js';
 import {fillChips} from '../shared/mode_marks.js';
@@ -20,7 +20,7 @@ import {fillSensitivity} from './sensitivity.js';
 import {Tuning} from './tuning.js';
 import {drawWorkspace} from './workspace.js';
 
-/// The fields, built again where the design has others, and the buttons that follow the state.
+/// The fields, built again if the design needs others, and the buttons that follow the state.
 function makeFields(page) {
   const form = new Form((change, ended) => page.edit(change, ended)), posture = postureFields(form, page);
   let fields = [], built = '';

@@ -1,8 +1,8 @@
-// What the controller refuses of the design that is edited, what it warns of, and joints outside their limits.
+// The controller's refusals and warnings of the edited design, and joints outside their limits.
 import {$, element} from '../shared/dom.js';
 import {isNumber, number, plain} from '../shared/numbers.js';
 
-/// The reason why each joint outside its limits is so.
+/// A reason for each joint outside its limits.
 function outside(page) {
   return page.setup.arm.joints.flatMap(({name, lower, upper, prismatic}, i) => {
     const x = page.state.q[i], within = x >= (lower ?? -Infinity) - 1e-9 && x <= (upper ?? Infinity) + 1e-9;
@@ -13,7 +13,7 @@ function outside(page) {
   });
 }
 
-/// {key, reason} of what is refused: by the program, or by the controller.
+/// {key, reason} of refusals by the program or the controller.
 function refusals(problem, answer) {
   if (problem) return [{key: problem.split(':')[0], reason: problem}];
   return (answer ? answer.refused : []).map(({key, reason}) => ({key, reason: key === 'q' ? `Here ${reason}.`
@@ -23,7 +23,7 @@ function refusals(problem, answer) {
 export function showRefusals(page) {
   const problem = page.problem[page.state.edited], answer = page.answer(), refused = refusals(problem, answer);
   const unknown = !problem && page.setup.rotors_unknown && !page.design().arm?.reflected_inertia;
-  $('reads').textContent = unknown ? 'rotors unknown: fast modes and margin are those without them' : '';
+  $('reads').textContent = unknown ? 'rotors unknown: fast modes and margin are computed without them' : '';
   const warned = (answer && !problem ? answer.warned : []).map(({reason}) => `Warning: ${reason}`);
   $('refused').replaceChildren(...[...refused.map(({reason}) => reason), ...outside(page), ...warned]
     .map((text) => element('li', {}, text)));

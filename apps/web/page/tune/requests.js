@@ -1,4 +1,4 @@
-// Questions to the program, of which the newest counts.
+// Requests to the program, of which the newest counts.
 
 /// Returns the answer, or {error}.
 export async function post(token, path, body) {
@@ -10,8 +10,8 @@ export async function post(token, path, body) {
   }
 }
 
-/// Asks at a path, one question at a time: while one is under way the newest of the others waits. `heard` is called
-/// with each answer and what was asked.
+/// Posts to a path, one request at a time: meanwhile the newest of the others waits. `heard` is called with each answer
+/// and its request.
 export class Newest {
   constructor(token, path, heard) { Object.assign(this, {token, path, heard, busy: false, next: null, last: ''}); }
   ask(question) {
@@ -25,7 +25,7 @@ export class Newest {
     while (this.next) {
       const body = this.next;
       this.next = null;
-      this.heard(await post(this.token, this.path, body), JSON.parse(body));  // what was asked may have changed since
+      this.heard(await post(this.token, this.path, body), JSON.parse(body));  // the request may have changed meanwhile
     }
     this.busy = false;
   }

@@ -1,4 +1,4 @@
-// What moves a damping ratio: an arrow for each entry of damping and stiffness, which takes a step of it.
+// The effect on a damping ratio: an arrow for each entry of damping and stiffness, which takes a step of it.
 import {$, button, element} from '../shared/dom.js';
 import {isNumber, number, rounded} from '../shared/numbers.js';
 import {kTaskAxes} from './designs.js';
@@ -14,7 +14,7 @@ function stepOf(which, {damping, stiffness}, i, j) {
     : 0.25 * Math.max(mean(damping), Math.sqrt(mean(stiffness)));
 }
 
-/// Adds a step to an entry of the matrix that acts, which then is given as a matrix.
+/// Adds a step to an entry of the matrix that acts, which then becomes the given matrix.
 function take(page, which, matrix, i, j, step) {
   const {mode, rotation} = page.design(), key = mode === 'joint' ? `joint_${which}` : which;
   const half = which === 'stiffness' && rotation === 'half-quaternion' && mode !== 'joint';  // half of it acts
@@ -25,7 +25,7 @@ function take(page, which, matrix, i, j, step) {
   page.edit(() => { page.design()[key] = compact(next.map((line) => line.map((x) => rounded(x, 6)))); }, true);
 }
 
-/// The arrow of an entry; `changes` are those of all ratios by a step.
+/// The arrow of an entry; `changes` has the change of each ratio by a step.
 function arrow(name, value, step, changes, chosen, click) {
   const now = changes[chosen], none = Math.abs(now) < kLeast;
   const said = `${name} = ${number(value)}; ${number(step, 2)} more changes the ratios of modes 1.. by ` +
@@ -34,7 +34,7 @@ function arrow(name, value, step, changes, chosen, click) {
     none ? '·' : `${now > 0 ? '↑' : '↓'}${number(Math.abs(now), 2)}`);
 }
 
-/// The mode whose ratio is looked at: as chosen, or the one of the smallest ratio; -1 where there is none.
+/// The mode of the arrows: as chosen, or the one with the smallest ratio; -1 if there is none.
 function chosenMode(modes) {
   const pick = $('arrow_mode');
   if (pick.options.length !== modes.length + 1) {

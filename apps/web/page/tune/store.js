@@ -15,7 +15,7 @@ export class Store {
       changed(true);
     });
   }
-  /// Takes the state of the address, as far as it has the form of one.
+  /// Takes the valid parts of the state in the address.
   read() {
     const start = JSON.parse(this.start);
     this.state = {...start};
@@ -30,7 +30,7 @@ export class Store {
     }
     this.kept = JSON.stringify(this.state);
   }
-  /// Changes the state; where the change has ended, it can be undone.
+  /// Changes the state; after its end the change can be undone.
   edit(change, ended) {
     change(this.state);
     if (ended) this.keep();

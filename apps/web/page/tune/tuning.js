@@ -1,4 +1,4 @@
-// What the page of `dashpot tune` is about: the state that is edited, and what the program says of both designs.
+// The model of the page of `dashpot tune`: the edited state, and the program's answers on both designs.
 import {$, keepErrors} from '../shared/dom.js';
 import {rounded} from '../shared/numbers.js';
 import {kDesigns} from './designs.js';
@@ -6,12 +6,12 @@ import {Newest, post} from './requests.js';
 import {Store} from './store.js';
 import {Workspace} from './workspace.js';
 
-const kTogether = 15;  // ms that the answer of one design waits for that of the other, to be drawn in one frame
+const kTogether = 15;  // ms that one answer waits for the other design's, to be drawn in one frame
 
 export class Tuning {
   errors = []; timing = []; poles = [];
   answers = {a: null, b: null};
-  asked = {a: null, b: null};       // what the answers are of
+  asked = {a: null, b: null};       // the requests of the answers
   problem = {a: '', b: ''};         // why there is no newer answer
   old = {a: false, b: false};       // whether the answers are of other designs
   chosen = null;                    // number of the mode whose shape is shown
@@ -41,7 +41,7 @@ export class Tuning {
   edit(change, ended) { this.store.edit(change, ended); }
   unitOf(joint) { return this.setup.arm.joints[joint]?.prismatic ? 'm' : 'rad'; }
   wantedRatio() { return this.design().damping.ratio || this.design().joint_damping.ratio || 0.7; }
-  /// The matrix of damping that acts, or null where the answer is of other springs.
+  /// The matrix of damping that acts, or null if the answer belongs to other springs.
   actingDamping() {
     const asked = this.asked[this.state.edited];
     return this.answer() && asked.design.mode === this.design().mode ? this.answer().gains.damping : null;
@@ -78,8 +78,8 @@ export class Tuning {
     this.moved = 0;
   }
 
-  /// Takes the damping of the wanted ratio at this posture: the matrix for all modes, or a diagonal of whose ratios it
-  /// is the smallest.
+  /// Sets the damping for the wanted ratio at this posture: the matrix for all modes, or a diagonal with that smallest
+  /// ratio.
   async propose(key, full) {
     const {edited: name, q, place} = this.state, ratio = this.wantedRatio();
     const ask = (damping) =>
@@ -93,7 +93,7 @@ export class Tuning {
     if (damping) this.edit((state) => { state[name][key] = damping.map(round); }, true);
     else this.redraw('texts');
   }
-  /// Scales a diagonal until its smallest ratio is so: {damping}, or {error}.
+  /// Scales a diagonal until its smallest ratio is `ratio`: {damping}, or {error}.
   async scaleDiagonal(damping, ratio, ask) {
     for (let turn = 1, scaled = damping; ; ++turn) {
       const {error, smallest_ratio: smallest} = await ask(scaled);

@@ -1,4 +1,4 @@
-// Ratios and margins over many postures: asked for in the background, drawn, and the worst of them to go to.
+// Ratios and margins over many postures: requested in the background, drawn, with buttons to go to the worst.
 import {$, button, fill} from '../shared/dom.js';
 import {number, rounded} from '../shared/numbers.js';
 import {kDesigns, kStyles, nameOf} from './designs.js';
@@ -7,11 +7,11 @@ import {post} from './requests.js';
 const kPostures = 2000;
 const kMost = 100;  // postures in a part
 const kRest = 150;  // ms without a change before the next part
-const kPart = 20;   // ms that a part is to take
+const kPart = 20;   // ms, intended duration of a part
 const kWorst = {smallest_ratio: 'ratio', gain_margin: 'margin'};
 
-/// The numbers of many postures for the designs, a part at a time, and none while something moves: a slider waits for
-/// one part at most. A design that changes begins again.
+/// The numbers of many postures for the designs, a part at a time, and paused while something moves: a slider waits for
+/// one part at most. A changed design begins again.
 export class Workspace {
   constructor(token, changed) {
     Object.assign(this, {token, changed, found: {}, asked: {}, busy: false, count: 25, moved: -Infinity});
@@ -59,7 +59,7 @@ export class Workspace {
   }
 }
 
-/// How many postures, in %, have less: at most 200 points of it, both ends among them.
+/// The share of postures, in %, with less: at most 200 points, with both ends.
 function share(values) {
   const sorted = Float64Array.from(values).sort(), n = sorted.length, count = Math.min(n, 200);
   const at = Array.from({length: count}, (_, i) => Math.round(i * (n - 1) / Math.max(count - 1, 1)));
