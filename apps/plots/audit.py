@@ -33,7 +33,7 @@ def audit(arm, *more):
 
 
 def rounded_up(value):
-    """Two digits: what is told is enough."""
+    """Rounds up to two digits, so that the value is still enough."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return f"{unit * math.ceil(value / unit - 1e-9):.2g}"
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the gains of public controllers bear on a Panda and an FR3, as tables in Markdown.
+"""The contact stiffness that public gains tolerate on a Panda and an FR3, as tables in Markdown.
 
 usage: contact.py DASHPOT [SAMPLES]
 
@@ -44,7 +44,7 @@ def main():
     for name in FRANKAS:
         print(f"{name}, its drives `{name}`:\n")
         table(["preset", "limit at home, N/m", "5 % of postures below", "least",
-               "with a low-pass", "with gears", "bear 1e5", "friction it lacks, N m s/rad",
+               "with a low-pass", "with gears", "stable at 1e5", "friction it lacks, N m s/rad",
                "least force, N, and springs in, mm"],
               *(row(name, preset, samples) for preset in PRESETS))
         print()

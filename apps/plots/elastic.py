@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""What gears that bend do to an impedance: tables in Markdown, and one for elastic.gp.
+"""The effect of elastic joints on an impedance: tables in Markdown, and one for elastic.gp.
 
 usage: elastic.py DASHPOT DIR
 
-First how far modes and gain margin of the arm with rigid joints are from those with gears, by the
-stiffness of the shoulder's gear. Then which ratios the double diagonalisation gives on the same elastic
-arm, with the inertia of the links alone and with that of the motors. Everything comes from `dashpot
+First the differences in modes and gain margin between rigid and elastic joints, by the stiffness of the
+shoulder's gear. Then the ratios of the double diagonalisation on the same elastic arm, with the inertia
+of the links alone and with the motors' inertia as well. Everything comes from `dashpot
 design` and `dashpot audit`. DIR/elastic.txt has the gain margin over the stiffness for motor and link.
 """
 import json

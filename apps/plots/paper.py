@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The modes of Table 1 of the paper beside those of the Panda as it may have been, in Markdown.
+"""The modes of Table 1 of the paper beside modes of possible variants of its Panda, in Markdown.
 
 usage: paper.py DASHPOT
 
