@@ -1,4 +1,4 @@
-// What `dashpot analyze` says to bad input: one line that names the key, status 2, no output.
+// Errors of `dashpot analyze` for bad input: one line that names the key, status 2, no output.
 #include <dashpot/tests/apps/run_program.hpp>
 
 #include <gmock/gmock.h>
@@ -20,8 +20,7 @@ const std::string kTwo =
 const std::string kMassAndDamping = "mass: [[2, 0], [0, 1]]\ndamping: [[1, 0], [0, 1]]\n";
 const std::string kTask = "mass: [[2, 0], [0, 1]]\njacobian: [[1, 1]]\n";
 
-/// What follows the file's name, which is a key with its colon, a part of the reason, and the
-/// input.
+/// The text after the file's name (a key with its colon), a part of the reason, and the input.
 struct BadInput {
   std::string key, reason, text;
 };
@@ -152,7 +151,7 @@ TEST(AnalyzeErrors, NameTheFileOrTheOption) {
   }
   expect_refused(run_program({"analyze", "-", "--pivot", "first"}), begin, "--pivot");
   expect_refused(run_program({"analyze", "-", "--residual", "2"}), begin, "--residual");
-  // What steers a terminal is shown as escapes.
+  // Control characters are shown as escapes.
   expect_refused(analyze_text("\"\\e[2J\": 1\n"), begin + "-: \\x1b[2J: ", "unknown key");
   expect_refused(run_program({"analyze", "\x1b[31m\x9b.yaml"}),
                  begin + "\\x1b[31m\\x9b.yaml: ", "cannot be opened");

@@ -1,4 +1,4 @@
-// What `dashpot analyze` rounds when it forms the coefficients of a file is in the bounds.
+// The bounds include the rounding of `dashpot analyze` when it forms the coefficients of a file.
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/quad_matrix.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -29,7 +29,7 @@ struct Systems {
   Systems() { file.precision(17); }
 };
 
-/// Expects the frequencies within their bounds, and these in sight of the errors.
+/// Expects the frequencies within their bounds, and bounds not far above the errors.
 void expect_counted(const Systems& systems) {
   const Json results = analyze_json(systems.file.str());
   ASSERT_EQ(results.size(), systems.frequencies.size());

@@ -1,4 +1,4 @@
-// The table that `dashpot analyze` prints for people, and the program's other manners.
+// The table that `dashpot analyze` prints for people, and other output of the program.
 #include <dashpot/tests/apps/json_result.hpp>
 
 #include <gmock/gmock.h>
@@ -54,7 +54,7 @@ TEST(AnalyzeTable, TellsTheSharesOfTheModesInAMotion) {
   const std::string text = table_of(analyze_text(release + "}"));
   EXPECT_THAT(text, ContainsRegex("\n +1 +1\\.7321 +0 +75\\.0 +0\\.500, 0\\.500\n"));
   EXPECT_THAT(text, ContainsRegex("\n +2 +1\\.0000 +0 +25\\.0 +0\\.500, 0\\.500\n"));
-  // Of the task p = q1 + q2 the first mode, in which they move against each other, takes no part.
+  // The first mode, in which q1 and q2 move against each other, does not move the task p = q1 + q2.
   const Json result =
       analyze_json(release + ", jacobian: [[1, 1]], task_stiffness: [[0]]}")["response"]["shares"];
   EXPECT_NEAR(result["energy"][0].get<double>(), 0.75, 1e-12);
@@ -151,7 +151,7 @@ TEST(AnalyzePlot, DrawsEigenvaluesAndShapes) {
                            "1: 30.00 rad/s, 5.00", "2: 2.000 rad/s, 0.200", "&lt;- 1: -297"}) {
     EXPECT_TRUE(drawn(system, text)) << text;
   }
-  // The fast eigenvalue does not shrink the others, which fill the picture.
+  // The other eigenvalues fill the picture in spite of the fast one.
   EXPECT_TRUE(drawn(system, "-2"));
   EXPECT_FALSE(drawn(system, "-50"));
   EXPECT_TRUE(drawn("{mass: [[1]], stiffness: [[900]], damping: [[300]]}", "-50"));

@@ -49,7 +49,7 @@ TEST(Audit, ReproducesWhatIsKnownOfPublicControllers) {
   }
 }
 
-/// Its slowest mode has 2.386 rad/s and a ratio of 0.25, and bears no integral below 0.84 s.
+/// Its slowest mode, 2.386 rad/s with a ratio of 0.25, is unstable with an integral below 0.84 s.
 TEST(Audit, CountsAnIntegralAndTellsHowItsSlowModesDecay) {
   const std::vector<std::string> options = {"--preset", "deoxys",    "--period",
                                             "1ms",      "--samples", "20"};

@@ -1,4 +1,4 @@
-// The table of apps/plots/compare.py, of a release whose numbers are known.
+// The table of apps/plots/compare.py, for a release with known numbers.
 #include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 

@@ -1,5 +1,5 @@
-// `dashpot design` beside what is there already: friction, null-space damping, inertia of the
-// drives and a payload, from a file and from a robot description; and the trends by them.
+// `dashpot design` with existing friction, null-space damping, inertia of the drives and a payload,
+// from a file and from a robot description; and the trends by them.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
@@ -34,8 +34,8 @@ MatrixXd matrix(const Json& rows) {
   return A;
 }
 
-/// Ratios of the oscillating modes of an arm of the controller's model, with the damping designed
-/// and what is there besides, from eigenvalues of the first-order system.
+/// Ratios of the oscillating modes of an arm of the controller's model, with the designed damping
+/// C_C and the additional damping D, from eigenvalues of the first-order system.
 std::vector<double> ratios(const controller::ModelOptions& options, const MatrixXd& C_C,
                            const MatrixXd& D) {
   const auto model = testing::arm_model(testing::arms()[0], options);
@@ -116,7 +116,7 @@ TEST(DesignBesideWhatIsThere, ReadsTheSameFromAFile) {
   }
 }
 
-// The trends by what a user can change, against the program itself with that changed.
+// The trends, compared with the program itself after a change.
 TEST(DesignTrends, MatchWhatTheProgramSaysOfAChangedArm) {
   const Json base =
       panda({"--sensitivity", "--viscous-friction", "0.1", "--reflected-inertia", "0.1"});
@@ -133,7 +133,7 @@ TEST(DesignTrends, MatchWhatTheProgramSaysOfAChangedArm) {
     std::sort(found.begin(), found.end());
     return found;
   };
-  // All ratios are 0.7 at first, so that their sum tells what the sorted ones cannot.
+  // All ratios are 0.7 at first, so their sum shows changes that the sorted ratios hide.
   const auto change = [&](const std::vector<double>& to, const std::vector<double>& from) {
     double sum = 0;
     for (std::size_t i = 0; i < 6; ++i) sum += to[i] - from[i];

@@ -50,7 +50,7 @@ TEST(Design, GivesEveryModeItsRatioAsAnalyzeSees) {
   const Json before = analyze_json(baxter());
   EXPECT_EQ(of_modes(result["before"], "damping_ratio"), of_modes(before, "damping_ratio"));
 
-  // The matrix put into the file, in place of the last of its keys that matter.
+  // The matrix in the file, in place of the last of its keys that matter.
   std::string text = baxter();
   text.replace(text.find("task_damping:"), std::string::npos,
                "task_damping: " + result["task_damping"].dump() + "\n");
@@ -139,7 +139,7 @@ TEST(Design, OfARegionMapsTheWorstMode) {
   EXPECT_THAT(table.err, IsEmpty());
 }
 
-/// And names the worst configuration where all reach their ratio.
+/// And names the worst configuration if all reach their ratio.
 TEST(Design, WritesTheMapOfARegion) {
   const std::string list = "[{mass: [[1]], stiffness: [[4]]}, {mass: [[2]], stiffness: [[4]]}]";
   const Scratch scratch;

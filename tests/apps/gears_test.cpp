@@ -1,4 +1,4 @@
-// What the program says of an arm whose gears bend.
+// Output of the program for an arm with elastic gears.
 #include <dashpot/tests/apps/json_result.hpp>
 
 namespace dashpot::tests {

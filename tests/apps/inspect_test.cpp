@@ -1,4 +1,4 @@
-// What `dashpot inspect` prints, and what it says to bad input.
+// Output of `dashpot inspect`, and its errors for bad input.
 #include <dashpot/controller/model/urdf_tree.hpp>
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
@@ -135,7 +135,7 @@ TEST(Inspect, RefusesDegreesWithoutTheirUnit) {
   expect_refusal(inspect_panda({"--q", "0,-45,0,-135,0,90,45 deg"}),
                  "--q: '-45' has no unit beside '45 deg'");
   EXPECT_EQ(inspect_panda({"--q", "0,-45,0,-135,0,90,45", "--outside-limits"}).status, 0);
-  // Its numbers are as true a little outside the limits as inside: a warning is enough.
+  // The results are valid outside the limits as well: a warning is enough.
   const Outcome outside = inspect_panda({"--q", "0,0,0,0,0,0,0"});
   EXPECT_EQ(outside.status, 0);
   EXPECT_EQ(outside.err,

@@ -1,5 +1,5 @@
 #pragma once
-// What the JSON of `dashpot analyze` is compared with.
+// Comparisons with the JSON of `dashpot analyze`.
 
 #include <dashpot/tests/apps/run_program.hpp>
 

@@ -1,5 +1,5 @@
-// Files that others wrote, or that are named by mistake: what the program keeps from overwriting,
-// and from printing as it is.
+// Files that others wrote, or that are named by mistake: the program does not overwrite them, and
+// does not print their control characters.
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/arms.hpp>
 

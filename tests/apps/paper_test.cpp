@@ -9,7 +9,7 @@ namespace {
 
 const Rows kChainMass = {{8, 0, 0}, {0, 2, 0}, {0, 0, 5}};
 
-/// And eliminates the heaviest coordinate unless told otherwise.
+/// And eliminates the heaviest coordinate by default.
 TEST(Chain3, HasTheModesAndTheFreeMotionOfThePaper) {
   const Json result = parse(run_program({"analyze", example("chain3.yaml"), "--json"}));
   EXPECT_EQ(result["dof"], 3);

@@ -50,7 +50,7 @@ TEST(Postures, OutsideTheLimitsAreRefusedUnlessAskedFor) {
   }
 }
 
-/// Nobody designs damping where a direction has no spring.
+/// Damping cannot be designed if a direction has no spring.
 TEST(Postures, ThatAreSingularAreRefusedOrAvoided) {
   const std::string straight = "0,0,0,-0.0698,0,1.5,0";
   const Outcome refused = ask_panda("design", kSprings, {"--q", straight});

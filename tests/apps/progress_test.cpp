@@ -1,4 +1,4 @@
-// Tasks that take long: what they show meanwhile, and what Ctrl-C leaves of them.
+// Long tasks: their progress, and their results after Ctrl-C.
 #include <dashpot/tests/apps/run_program.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/dice.hpp>
@@ -196,7 +196,7 @@ TEST(Progress, CtrlCEndsACheckOfAModelAtOnce) {
   EXPECT_EQ(program.complaints(), "dashpot check-model: interrupted\n");
 }
 
-/// Where every write fails, each writer says so, with the name of the file.
+/// If every write fails, each writer says so, with the name of the file.
 TEST(FullDisk, IsAnErrorOfEveryWriter) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
   const Scratch scratch;

@@ -1,4 +1,4 @@
-// Scenes in which something goes wrong, and what the summary says of them.
+// Scenes with faults, and their summary.
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/places.hpp>
 
@@ -22,7 +22,7 @@ std::map<std::string, Numbers> with_faults(const std::string& faults) {
   return table(csv);
 }
 
-/// What each of them does is tested in tests/sim; here, that its keys mean it and when it acts.
+/// tests/sim tests the effect of each fault; this tests its keys and when it acts.
 TEST(Faults, ActWhileTheyLast) {
   const auto plain = with_faults("begin: 0.9 s, frozen: true");
   const Numbers &q = plain.at("q2"), &qd = plain.at("qd2");
@@ -127,7 +127,7 @@ std::vector<std::string> safety_scenes() {
 class SafetyScene : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(SafetyScene, RunsToItsEndAndAccountsForItsEnergy) {
-  // Scenes that need long say on standard error how far they are.
+  // Long scenes show their progress on standard error.
   const Outcome outcome = run_scene(scene("safety/" + GetParam()), {"--json"});
   const Json result = Json::parse(outcome.out);
   ASSERT_EQ(outcome.status, result["fault"].is_null() ? 0 : 1) << outcome.err;

@@ -147,7 +147,7 @@ inline auto count_lines(const std::string& text) {
   return std::count(text.begin(), text.end(), '\n');
 }
 
-/// That the program said no, in one line that holds `text`, and nothing else.
+/// Expects a refusal in one line that contains `text`, and no other output.
 inline void expect_refusal(const Outcome& outcome, const std::string& text) {
   SCOPED_TRACE(text);
   EXPECT_EQ(outcome.status, 2);
@@ -157,7 +157,7 @@ inline void expect_refusal(const Outcome& outcome, const std::string& text) {
   EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
 }
 
-/// Words that a command refuses, and a part of what it says.
+/// Words that a command refuses, and a part of its message.
 struct Refusal {
   Words words;
   std::string said;

@@ -1,4 +1,4 @@
-// What `dashpot run` refuses, and what it says then.
+// Refusals of `dashpot run` and their messages.
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/places.hpp>
 
@@ -12,7 +12,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// A scene, what is replaced in it, and what is said then; an @ stands for a number.
+/// A scene, the replacement in it, and the message; an @ stands for a number.
 struct BadScene {
   const char *scene, *from, *to, *message;
 };

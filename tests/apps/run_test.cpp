@@ -1,4 +1,4 @@
-// `dashpot run` in fast motion: a whole robot, its controller as a plugin, and what is written.
+// `dashpot run` in fast motion: a whole robot, its controller as a plugin, and the output.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/arms.hpp>
@@ -66,10 +66,10 @@ TEST(Scenes, AreAllTested) {
        std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes")) {
     files += entry.path().extension() == ".yaml" ? 1 : 0;
   }
-  EXPECT_EQ(files, 14U);  // those of EveryScene
+  EXPECT_EQ(files, 14U);  // as in EveryScene
 }
 
-/// Every key that the reader says it knows stands in the example.
+/// The example has every key that the reader names as known.
 TEST(Scenes, TheExampleShowsEveryKey) {
   const Scratch scratch;
   const std::string example = text_of(scene("panda"));
@@ -126,7 +126,7 @@ TEST(Run, LowersARatioBeforeTheArmShakes) {
   EXPECT_GT(lowered["least_damping_level"].get<double>(), 0.1);
   EXPECT_LT(lowered["least_damping_level"].get<double>(), 0.5);
   EXPECT_LT(lowered["largest_tracking_error"]["joint"].get<double>(), 0.1);
-  for (const char* end : {"start", "end"}) {  // drawn in; friction of 0.01 N m s/rad besides
+  for (const char* end : {"start", "end"}) {  // drawn in, with friction of 0.01 N m s/rad
     EXPECT_NEAR(lowered["modes"][end][0]["damping_ratio"], 2, 0.01);
   }
   run_scene(scene("panda_late_torque"), {"--csv", scratch.path("again.csv")});
@@ -150,7 +150,7 @@ TEST(Run, FindsCloseModesWhereTheSampledLoopHasThem) {
 }
 
 // Table 1 of the paper: 20.25, 10.98, 9.755 rad/s with 0.0255, 0.0316, 0.0294 (C1), 20.23, 10.95,
-// 11.17 with 0.2235, 0.2032, 0.2288 (C2). Its hand weighs a little more than that of the model.
+// 11.17 with 0.2235, 0.2032, 0.2288 (C2). Its hand is a little heavier than the model's.
 TEST(Run, ShowsTheReleasesOfThePaper) {
   DASHPOT_SKIP_IF_QUICK();
   const auto slow_modes = [](const std::string& name) {
@@ -225,7 +225,7 @@ TEST(Run, SimulatesTheRobotThatTheControllerIsTold) {
   EXPECT_LT(result["largest_tracking_error"]["tip"].get<double>(), 1e-9);
 }
 
-/// Whose sensors are on the links, has the links where it is told to start; otherwise the motors.
+/// The start is the position of the links if the sensors are there, and otherwise of the motors.
 TEST(Run, SimulatesGearsThatBend) {
   DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
@@ -246,7 +246,7 @@ TEST(Run, SimulatesGearsThatBend) {
     EXPECT_GT(energy["initial"]["springs"].get<double>(), 0.05);
   }
   EXPECT_EQ(rigid["gear_heat"], 0);
-  // What the controller is told is true, unless the simulation knows better.
+  // The simulation has the controller's values unless it has its own.
   const auto told = [&](const std::string& gears, const std::string& simulated) {
     const std::string file = changed(
         scratch, "iiwa14",
