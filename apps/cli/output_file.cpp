@@ -83,7 +83,7 @@ void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<Name
     std::error_code none;
     for (const char* kept : {".yaml", ".yml", ".urdf", ".xacro", ".xml"}) {
       if (told || kind != kept || !fs::exists(output.path, none)) continue;
-      throw InputError(output.what, output.path + ": is there already, and no file of this kind");
+      throw InputError(output.what, output.path + ": exists, and is not a file of this kind");
     }
     others.push_back(output);
   }

@@ -87,7 +87,7 @@ void ClosedLoop::guide(const JointVector& from, const JointVector& to, double du
     goal_.note_status(status);
     if (status >= DASHPOT_SETPOINT_REJECTED && !scene_.outside_limits) {
       throw InputError("scenario.start",
-                       std::string("the controller does not take it: ") +
+                       std::string("the controller refuses it: ") +
                            controller::to_text(static_cast<controller::Status>(status)))
           .in_file(scene_.path);
     }

@@ -164,7 +164,7 @@ TEST(Mistakes, DoNotReplaceAConfigurationByATable) {
   const std::string config = scratch.write("arm.yaml", "a: 1");
   expect_refusal(run_program(joined(of_panda("audit", kStiffness),
                                     {"--damping-factor", "2", "--samples", "5", "--csv", config})),
-                 "--csv: " + config + ": is there already, and no file of this kind");
+                 "--csv: " + config + ": exists, and is not a file of this kind");
   EXPECT_EQ(scratch.read("arm.yaml"), "a: 1");
 }
 

@@ -24,7 +24,7 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
             "scenario.duratoin: unknown key; the keys are duration, start, pushes, loads, "
             "steps, faults, ring_down (line 17)"},
            {"ur5", "scenario:", "watchdog: {setpoint_hold: 0.1 ms}\nscenario:",
-            "scenario.start: the controller does not take it: set-point stale, holding"},
+            "scenario.start: the controller refuses it: set-point stale, holding"},
            {"ur5", "duration: 6 s", "duration: 6 kg",
             "scenario.duration: has a wrong unit: '6 kg'; s is wanted (line 17)"},
            {"ur5", "duration: 6 s", "duration: -6 s",
