@@ -246,6 +246,8 @@ typedef struct dashpot_snapshot {
   double task_damping_ratio;
   double damping_level; /* share of its ratio that the mode has that the sampled loop leaves least,
                            those of the null space too; 1: the loop bears all ratios */
+  double energy_store; /* left in the energy tank, J; infinite if control.energy is free */
+  double spring_share; /* of the springs' torque that the energy in the tank allows; 1: all */
   /* What the arm counts with at this tick, on the way to what dashpot_set_payload was told. */
   double payload_mass;       /* kg */
   double payload_center[3];  /* from the tip link's origin, in its axes, m */

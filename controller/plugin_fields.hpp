@@ -33,6 +33,8 @@ void copy_fields(S& of, C& c, const Copy& copy) noexcept {
     copy(of.joint_damping_ratio, c.joint_damping_ratio);
     copy(of.task_damping_ratio, c.task_damping_ratio);
     copy(of.damping_level, c.damping_level);
+    copy(of.energy_store, c.energy_store);
+    copy(of.spring_share, c.spring_share);
     copy(of.payload.mass, c.payload_mass);
     copy(of.payload.center, c.payload_center);
     copy(of.payload.inertia, c.payload_inertia);

@@ -44,7 +44,8 @@ struct Snapshot {
   /// Share of its ratio that the mode has that the sampled loop leaves least, of the ratios above
   /// and of the null space's: above 0, and 1 where the loop bears all of them.
   double damping_level = 1;
-  double energy_store = std::numeric_limits<double>::quiet_NaN();  ///< S of EnergyTank, J; NaN: none
+  double energy_store = std::numeric_limits<double>::infinity();  ///< S of EnergyTank, J; infinite
+                                                                  ///< without a tank
   double spring_share = 1;  ///< of the springs' torque that the energy in the tank allows
   Payload payload;  ///< in force at this tick, on the way to what Controller::attach was given
   Pose tool;        ///< likewise: T in the tip link

@@ -98,6 +98,12 @@ std::string told(const state_t& state) {
   if (state.damping_level < 1) {
     text += "; lowered to " + format_number(state.damping_level, 3) + " of it";
   }
+  if (std::isfinite(state.energy_store)) {
+    text += "; energy tank " + format_number(state.energy_store, 3) + " J";
+  }
+  if (state.spring_share < 1) {
+    text += "; springs weakened to " + format_number(state.spring_share, 3);
+  }
   return text;
 }
 

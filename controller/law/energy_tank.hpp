@@ -49,9 +49,9 @@ class EnergyTank {
 
   double store_;  ///< J; 0: there is no tank
   double level_ = 0, committed_ = 0, share_ = 1;
+  Impedance weakened_;
   std::size_t delay_, applied_ = 0;  ///< ticks; torques that were put out
   bool known_ = false;               ///< q_ and weight_
-  Impedance weakened_;
   JointVector viscous_, coulomb_;
   JointVector q_, weight_;
   std::array<JointVector, kMostDelay + 1> torques_;

@@ -137,6 +137,8 @@ void fill(const StateSample& sample, state_t& message) {
   message.joint_damping_ratio = snapshot.joint_damping_ratio;
   message.task_damping_ratio = snapshot.task_damping_ratio;
   message.damping_level = snapshot.damping_level;
+  message.energy_store = snapshot.energy_store;
+  message.spring_share = snapshot.spring_share;
   message.payload_mass = snapshot.payload.mass;
   copy_to(snapshot.payload.center, message.payload_center);
   copy_to(snapshot.tool.position, message.tool_position);

@@ -130,6 +130,10 @@ class Snapshot(Result):
     """Likewise of the Cartesian springs."""
     damping_level: float
     """Share of its ratio that the mode has that the sampled loop leaves least; 1: it bears all ratios."""
+    energy_store: float
+    """Left in the energy tank, J; infinite if control.energy is free."""
+    spring_share: float
+    """Of the springs' torque that the energy in the tank allows; 1: all."""
     payload_mass: float
     """kg, with which the arm counts at this tick, on the way to that of set_payload."""
     payload_center: Array

@@ -90,6 +90,8 @@ nb::object snapshot_of(dashpot_controller* controller) {
   result["joint_damping_ratio"] = found.joint_damping_ratio;
   result["task_damping_ratio"] = found.task_damping_ratio;
   result["damping_level"] = found.damping_level;
+  result["energy_store"] = found.energy_store;
+  result["spring_share"] = found.spring_share;
   result["payload_mass"] = found.payload_mass;
   result["payload_center"] = to_array(Map(found.payload_center, 3));
   result["payload_inertia"] = to_array(RotationMap(found.payload_inertia));

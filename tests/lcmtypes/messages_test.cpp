@@ -87,6 +87,8 @@ TEST(StateMessage, SaysWhatTheSampleSays) {
     EXPECT_EQ(message.joint_damping_ratio, snapshot.joint_damping_ratio);
     EXPECT_EQ(message.task_damping_ratio, snapshot.task_damping_ratio);
     EXPECT_EQ(message.damping_level, snapshot.damping_level);
+    EXPECT_EQ(message.energy_store, snapshot.energy_store);
+    EXPECT_EQ(message.spring_share, snapshot.spring_share);
     EXPECT_EQ(message.payload_mass, snapshot.payload.mass);
     EXPECT_THAT(message.payload_center, ElementsAreArray(list(snapshot.payload.center)));
     EXPECT_THAT(message.tool_position, ElementsAreArray(list(snapshot.tool.position)));

@@ -48,6 +48,8 @@ inline StateSample random_state(Random& random, int n) {
   snapshot.joint_damping_ratio = random.uniform(0, 2);
   snapshot.task_damping_ratio = random.uniform(0, 2);
   snapshot.damping_level = random.uniform(0.1, 1);
+  snapshot.energy_store = random.uniform(0, 10);
+  snapshot.spring_share = random.uniform(0, 1);
   snapshot.payload = {random.uniform(0, 9), random.vector(3), Eigen::Matrix3d::Identity()};
   snapshot.tool = random_pose(random);
   snapshot.fault = static_cast<controller::Status>(random.integer(0, 13));

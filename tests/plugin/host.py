@@ -52,6 +52,8 @@ class Snapshot(c.Structure):
                 ("tip_wrench", c.c_double * 6),
                 ("joint_damping_ratio", c.c_double), ("task_damping_ratio", c.c_double),
                 ("damping_level", c.c_double),
+                ("energy_store", c.c_double),
+                ("spring_share", c.c_double),
                 ("payload_mass", c.c_double), ("payload_center", c.c_double * 3),
                 ("payload_inertia", c.c_double * 9), ("tool_position", c.c_double * 3),
                 ("tool_rotation", c.c_double * 9)]

@@ -258,7 +258,8 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   snapshot.tip_error = numbers.vector(6);
   snapshot.tip_wrench = numbers.vector(6);
   for (double* value : {&snapshot.joint_damping_ratio, &snapshot.task_damping_ratio,
-                        &snapshot.damping_level, &snapshot.payload.mass}) {
+                        &snapshot.damping_level, &snapshot.energy_store,
+                        &snapshot.spring_share, &snapshot.payload.mass}) {
     *value = numbers();
   }
   snapshot.payload.center = numbers.vector(3);
@@ -289,7 +290,7 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
               &Snapshot::velocity, &Snapshot::torque, &Snapshot::law_torque,
               &Snapshot::reference_position, &Snapshot::tip_error, &Snapshot::tip_wrench,
               &Snapshot::joint_damping_ratio, &Snapshot::task_damping_ratio,
-              &Snapshot::damping_level);
+              &Snapshot::damping_level, &Snapshot::energy_store, &Snapshot::spring_share);
   EXPECT_EQ(again.joint_error, JointVector(snapshot.reference_position - snapshot.position));
   for (const auto pose : {&Snapshot::tip, &Snapshot::reference_tip, &Snapshot::tool}) {
     expect_same(again.*pose, snapshot.*pose, &Pose::position, &Pose::rotation);

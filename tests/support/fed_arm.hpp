@@ -7,7 +7,7 @@
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/support/mujoco_arm.hpp>
-#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/dice.hpp>
 #include <dashpot/tests/support/twin_models.hpp>
 
 #include <algorithm>
@@ -112,7 +112,7 @@ struct FedArm {
   }
 
   static constexpr double kSeconds = 3;
-  Random random;
+  Dice random;
   Arm arm{};
   std::optional<TwinModels> twin;
   controller::Settings settings;
@@ -145,7 +145,7 @@ struct FedArm {
   }
   template <class Position, class Velocity, class Step>
   Fed run(bool tank, const Position& position, const Velocity& velocity, const Step& step) {
-    Random policy = random;  // the same for both
+    Dice policy = random;  // the same for both
     using From = controller::Energy::From;
     settings.energy.from = tank ? From::kTank : From::kFree;
     controller::Controller controller(twin->model, settings);
@@ -169,7 +169,7 @@ struct FedArm {
           const bool joint = setpoint.mode == controller::Mode::kJoint;
           const auto now = evaluate(twin->model, state.position, state.velocity);
           const double back = joint ? seen.joint_error.dot(state.velocity)
-                                    : seen.tip_error.dot(twist(now.J, state.velocity));
+                                    : seen.tip_error.dot(now.J * state.velocity);
           factor = back > 0 ? 10 : 1;
         }
         setpoint.gains.joint_stiffness = factor * base.joint_stiffness;

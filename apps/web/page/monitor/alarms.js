@@ -68,6 +68,8 @@ export function fillLoopNumbers(page, rate) {
     ['force of springs', joint ? 'joint mode: none at the tip' : `${fixed(force, 2)} N at the tip, before limits`],
     ['damping', ratio > 0 ? `designed for ratio ${number(ratio, 3)}` +
       `${level < 1 ? `, lowered to ${number(level, 3)} of it` : ''}` : 'given as numbers'],
+    ['energy tank', state.energy_store === null ? 'none' : `${number(state.energy_store, 3)} J` +
+      `${state.spring_share < 1 ? `, springs weakened to ${number(state.spring_share, 3)}` : ''}`],
     ['payload', `${fixed(state.payload_mass, 3)} kg`],
     ['commands', `${state.commands_accepted} accepted, ${state.commands_rejected} refused; ` +
       `${state.commander ? `sender ${state.commander} commands` : 'no commander'}`]]);
