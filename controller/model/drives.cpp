@@ -81,7 +81,7 @@ constexpr std::array kDrives = {
         "same for all joints; not confirmed by a record"},
     Drives{"ur5e", 6, all(0.1, 6), kNone, kNone, kMenagerieUr,
            "a round number, the same for all joints, not confirmed by a record; the damping there "
-           "is that of a position servo"},
+           "belongs to a position servo"},
     Drives{"ur10e", 6, all(0.1, 6), kNone, kNone, kMenagerieUr,
            "a round number, which a public record contradicts (shamilmamedov/dynamic_calibration): "
            "0.30 to 0.42 kg m^2 in the wrists, 1.4 to 3.4 in the first three joints"},
