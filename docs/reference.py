@@ -26,7 +26,7 @@ def link(path, text, target):
         return text
     file = os.path.normpath(os.path.join(os.path.dirname(path), file))
     if not os.path.exists(file):
-        return f"[{text}](@ref {file})"  # which doxygen complains of
+        return f"[{text}](@ref {file})"  # which doxygen reports
     if file.endswith(".md"):
         return f"[{text}](@ref {page(file)})"
     if os.path.dirname(file) in LIBRARIES and file.endswith((".h", ".hpp")):

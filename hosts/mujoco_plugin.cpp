@@ -179,7 +179,7 @@ class Arm {
     const char* const end = index.data() + index.size();
     const auto [rest, error] = std::from_chars(index.data(), end, release_);
     if (error == std::errc() && rest == end && release_ >= 0 && release_ < model->nuserdata) return;
-    throw std::runtime_error("release: '" + index + "' is no index of userdata, which has " +
+    throw std::runtime_error("release: '" + index + "' is not an index of userdata, which has " +
                              std::to_string(model->nuserdata) + " numbers");
   }
 

@@ -172,7 +172,7 @@ const Drives& find_drives(std::string_view name) {
     if (drives.name == name) return drives;
     names += (names.empty() ? "" : ", ") + std::string(drives.name);
   }
-  throw InvalidModel("'" + text::printable(std::string(name)) + "' is none of " + names +
+  throw InvalidModel("'" + text::printable(std::string(name)) + "' is not one of " + names +
                      ", and no drives file (.yaml)");
 }
 

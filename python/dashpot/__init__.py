@@ -1,8 +1,8 @@
 """Vibration modes of impedance-controlled robot arms, with proved bounds, and the controller.
 
-Units are SI. The base link is B, the tip or tool frame is T; twists and wrenches have the linear
-part first, are taken at T's origin, in B's axes. Results cannot be changed and can be pickled.
-Everything that Dashpot refuses is a dashpot.Error, a ValueError with the program's message.
+Units are SI. The base link is B, the tip or tool frame is T. Twists and wrenches have the linear
+part first, at T's origin, in B's axes. Results are read-only and can be pickled.
+Input that Dashpot refuses raises dashpot.Error, a ValueError with the program's message.
 """
 
 from importlib.metadata import version as _version

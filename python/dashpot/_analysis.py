@@ -41,7 +41,7 @@ def modes(M: npt.ArrayLike, C: npt.ArrayLike | None = None, K: npt.ArrayLike | N
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Response(Result):
     """Motion of a system at t times: position and velocity of its n coordinates, the parts of
-    them along the zero modes, and what each of its m modes has in it."""
+    them along the zero modes, and the shares of its m modes."""
 
     times: Array
     """t, s."""
@@ -58,9 +58,9 @@ class Response(Result):
     zero_mode_share: float
     """The same of the drift along the zero modes. All shares add up to one."""
     cross_share: float
-    """What the whole motion has beyond that sum, relative to it: energy that modes share."""
+    """Energy of the whole motion minus that sum, relative to it: energy that modes share."""
     amplitude: Array
-    """m x p: how far each mode alone takes each of the points; infinite if it grows."""
+    """m x p: largest deflection of each point by each mode alone; infinite if it grows."""
 
 
 def response(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
@@ -69,10 +69,10 @@ def response(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
              force: npt.ArrayLike | None = None, points: npt.ArrayLike | None = None) -> Response:
     """Returns the motion of M q'' + C q' + K q = f, in closed form.
 
-    It starts at t = 0 from `initial_position` and `initial_velocity` (n each, zero by default), and
-    feels `impulse` (n, N s or N m s) at t = 0 and `force` (n, N or N m) from t = 0 on. Amplitudes
-    are those of the points J q with J = `points` (p x n, such as three rows of Robot.jacobian), or
-    of q. Raises Error as `modes` does, and for other sizes and times below zero.
+    It starts at t = 0 from `initial_position` and `initial_velocity` (n each, zero by default).
+    `impulse` (n, N s or N m s) acts at t = 0, and `force` (n, N or N m) from t = 0 on. Amplitudes
+    belong to the points J q with J = `points` (p x n, such as three rows of Robot.jacobian), or
+    to q. Raises Error as `modes` does, and for other sizes and times below zero.
     """
     return Response(**_core.response(
         _impedance(M, C, K, None, None, None), to_numbers("times", times, 1),
@@ -83,8 +83,8 @@ def response(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
 
 def receptance(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
                omega: npt.ArrayLike) -> ComplexArray:
-    """Returns H = (K + i omega C - omega^2 M)^-1 (n x n) at omega (rad/s), from the modes, or for
-    many frequencies (an array) one after the other (..., n x n)."""
+    """Returns H = (K + i omega C - omega^2 M)^-1 (n x n) at omega (rad/s), from the modes; for an
+    array of frequencies ... x n x n."""
     system, at = _impedance(M, C, K, None, None, None), np.asarray(omega, dtype=np.float64)
     each = [_core.receptance(system, one) for one in at.ravel().tolist()]
     return np.asarray(each).reshape(at.shape + np.shape(each[0]) if each else (0, 0, 0))
@@ -134,8 +134,7 @@ def sensitivities(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class SampledModes(Result):
-    """Modes of a loop that a computer closes once a period, each beside the continuous mode that it
-    comes from."""
+    """Modes of a loop that a computer closes once a period, each with its continuous mode."""
 
     natural_frequency: Array
     """m, rad/s; NaN if there is none."""
@@ -147,12 +146,12 @@ class SampledModes(Result):
     discrete_eigenvalues: ComplexArray
     """m x 2, z: eigenvalues of the map from tick to tick."""
     kind: TextArray
-    """m of underdamped, critical, overdamped, undamped, unstable, soft, or alternating: one with a
-    negative z changes its sign with every tick."""
+    """m of underdamped, critical, overdamped, undamped, unstable, soft, or alternating: a negative
+    z, which changes the sign of the motion in every tick."""
     zero_modes: ComplexArray
     """z of the velocities along the zero modes that are damped."""
     memory: ComplexArray
-    """z of the slow modes that the integral makes."""
+    """z of the slow modes that the integral causes."""
     others: ComplexArray
     """z of the loop's own memory: delay, filter, last position."""
     spectral_radius: float
@@ -189,12 +188,12 @@ def sampled_modes(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | 
                   difference_velocity: bool = False, friction: npt.ArrayLike | None = None,
                   gravity_gradient: npt.ArrayLike | None = None,
                   integral_time: float = 0) -> SampledModes:
-    """Returns the modes of the loop as it is sampled: the torque -K q - C q' is computed once a
+    """Returns the modes of the sampled loop: the torque -K q - C q' is computed once a
     `period` (s), acts `delay` ticks later, is held until the next tick, and passes a first-order
-    low-pass of `torque_cutoff` (Hz; 0: none). With `difference_velocity` the controller takes
-    (q_k - q_k-1) / period for q'. `friction` (n x n) is the part of C that the joints supply, and
+    low-pass of `torque_cutoff` (Hz; 0: none). With `difference_velocity` the controller uses
+    (q_k - q_k-1) / period for q'. `friction` (n x n) is the part of C in the joints, and
     `gravity_gradient` (n x n) the gradient of the gravity that the controller compensates. With an
-    `integral_time` t (s; 0: none) the controller integrates its springs, too: its torque has another
+    `integral_time` t (s; 0: none) the controller also integrates its springs: its torque has another
     term -s with s' = K q / t.
 
     Raises Error as `modes` does, and for a period that is not positive.
@@ -209,7 +208,7 @@ def sampled_modes(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | 
 
 @dataclasses.dataclass(frozen=True)
 class Miss:
-    """A mode that misses the ratio wanted."""
+    """A mode that misses the wanted ratio."""
 
     mode: int
     """Index in the modes, from 0."""
@@ -225,7 +224,7 @@ class DampingDesign(Result):
     """A positive semidefinite damping matrix and the modes that it gives."""
 
     damping: Array
-    """C_C (m x m) where the stiffness is given in task space, otherwise C (n x n)."""
+    """C_C (m x m) if the stiffness is given in task space, otherwise C (n x n)."""
     modes: Modes
     misses: tuple[Miss, ...]
     """Empty if every mode has its ratio."""
@@ -234,9 +233,9 @@ class DampingDesign(Result):
     sampled: SampledModes | None = None
     """Of the sampled loop, if a period was given."""
     level: float = 1
-    """Share of the ratios wanted that the sampled loop bears."""
+    """Share of the wanted ratios with which the sampled loop keeps its gain margin."""
     kept: bool = True
-    """False if no damping keeps the gain margin; the design is not to be used then."""
+    """False if no damping keeps the gain margin: do not use the design."""
 
 
 def design_damping(M: npt.ArrayLike, K: npt.ArrayLike | None = None, *, damping_ratio: float = 0.7,
@@ -250,17 +249,17 @@ def design_damping(M: npt.ArrayLike, K: npt.ArrayLike | None = None, *, damping_
     """Returns the damping with which every mode has `damping_ratio`.
 
     The springs are `task_stiffness` K_C (m x m) at `jacobian` J (m x n), or K (n x n) alone. The
-    design is added to `damping` (n x n), which is there already. With `high_ratio` the ratio changes
-    with the frequency, from `damping_ratio` of slow modes to `high_ratio` of fast ones, half-way at
+    design is added to the existing `damping` (n x n). With `high_ratio` the ratio changes
+    with the frequency, from `damping_ratio` of slow modes to `high_ratio` of fast modes, half-way at
     `corner` (rad/s). `structure` is full, block or diagonal; with `start` the result is near that
-    matrix. Modes below `soft_frequency` (rad/s) get less. With a `period` (s) the loop is the one of
-    `sampled_modes`, where the springs of the task alone are integrated, and keeps `gain_margin`.
+    matrix. Modes below `soft_frequency` (rad/s) get less. With a `period` (s) the loop is sampled as
+    in `sampled_modes`, with an integral of only the task's springs, and keeps `gain_margin`.
 
     Raises Error as `modes` does.
     """
     high = damping_ratio if high_ratio is None else high_ratio
     if max(damping_ratio, high) > 5:
-        warnings.warn(f"a damping ratio of {max(damping_ratio, high)} is no percentage", stacklevel=2)
+        warnings.warn(f"a damping ratio of {max(damping_ratio, high)} is not a percentage", stacklevel=2)
     loop = None
     if period is not None:
         loop = _core.SampledLoop(period, delay, torque_cutoff, False, None, None,

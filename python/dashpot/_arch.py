@@ -1,4 +1,4 @@
-"""Chooses the module _core that is the fastest for this processor."""
+"""Chooses the fastest module _core for this processor."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FEATURES = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsav
 
 
 def _flags() -> set[str]:
-    """Returns what the processor has. The kernel lists AVX only if it keeps the registers of AVX."""
+    """Returns the processor's features. The kernel lists AVX only if it keeps the registers of AVX."""
     try:
         with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
             for line in file:
@@ -27,9 +27,9 @@ def _flags() -> set[str]:
 
 def load_core() -> str:
     """Imports dashpot._core and returns for which processors it was compiled: x86-64-v3 if the
-    package has that build and the processor has what it needs. The environment variable
-    DASHPOT_ARCH names one of the builds instead; ImportError if there is none, or if this processor
-    cannot run it."""
+    package has that build and the processor has the features. The environment variable
+    DASHPOT_ARCH selects a build instead; ImportError if it is missing, or if this processor cannot
+    run it."""
     folder = pathlib.Path(__file__).parent / _FAST
     builds = sorted(folder.glob("_core.*"))
     wanted = os.environ.get("DASHPOT_ARCH", "")

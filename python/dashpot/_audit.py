@@ -19,54 +19,54 @@ from ._workers import Task, chunks_of, collect, workers
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class PostureAudit(Result):
-    """A posture in full. Numbers with a bound are proved to be that near the true ones."""
+    """A posture in full. The true number lies within the proved bound, where there is one."""
 
     q: Array
     """n, rad."""
     modes: Modes
     smallest_ratio: float
-    """Smallest damping ratio of the modes that are not soft; NaN if there is none."""
+    """Smallest damping ratio of the modes that are not soft; NaN if all are soft."""
     fastest_pole: float
     """Real part of the fastest eigenvalue of the continuous loop, 1/s; negative if damped."""
     gain_margin: float
     """Factor by which stiffness and damping may grow together; NaN without a period."""
     assumes: list[str]
-    """What the loop leaves out that the arm may have, such as "gravity ideal", "rotors unknown"."""
+    """Effects that the loop omits, such as "gravity ideal", "rotors unknown"."""
     singular: bool
     smallest_ratio_bound: float
     fastest_pole_bound: float
     """1/s."""
     integral_decays: Array
-    """Rates at which the slow modes of the integral decay, 1/s, the slowest first; none without an
+    """Decay rates of the slow modes of the integral, 1/s, the slowest first; empty without an
     integral or a period."""
     rotors: str
-    """known, or unknown where a joint has no reflected inertia: then fast modes, pole and margin are
-    those of an arm without rotors (Robot.missing_rotors names the joints)."""
+    """known, or unknown if a joint has no reflected inertia: fast modes, pole and margin then belong
+    to an arm without rotors (Robot.missing_rotors names the joints)."""
     reflected_inertia_for_margin: Array | None
-    """n, kg m^2, of the joints without, that would be enough for the margin asked for; zeros where
+    """n, kg m^2, that the joints without rotors need for the wanted margin; zeros where
     none is needed. None if rotors are known, without a period, or if no inertia is enough."""
     damping_ratios_with_rotors: Array
-    """m, of the modes with published rotors of such an arm, or else with that inertia, each beside
-    the mode without rotors whose shape is likest; NaN where none is left. Empty where there is neither."""
+    """m, of the modes with published rotors of such an arm, or else with that inertia, in the order
+    of the most similar modes without rotors; NaN without such a mode. Empty if neither is known."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Distribution(Result):
-    """How one number is distributed over postures; each entry is the number at one of them."""
+    """Distribution of one number over postures; each entry is the number at one posture."""
 
     median: float
     p05: float
     p95: float
     worst: float
     worst_q: Array
-    """n, rad, the posture of the worst; no entries if no posture has the number."""
+    """n, rad, the posture of the worst; empty if no posture has the number."""
     bound: float
     """Largest proved bound of the four entries; NaN for the gain margin."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class WorkspaceAudit(Result):
-    """Many postures in short."""
+    """Summary of many postures."""
 
     samples: int
     singular: int
@@ -78,7 +78,7 @@ class WorkspaceAudit(Result):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class DampingSuggestion(Result):
-    """Damping that gives every mode the ratio wanted at one posture."""
+    """Damping that gives every mode the wanted ratio at one posture."""
 
     damping: Array
     """6 x 6 in the axes of the gains' frame, or n x n for joint springs."""
@@ -97,7 +97,7 @@ class Contact(Result):
     direction: Array
     """3, of length 1, in the base's axes."""
     limit: float
-    """Stiffness up to which the loop is stable, N/m; 0: it is not in the air, infinite: above 1e9."""
+    """Stiffness up to which the loop is stable, N/m; 0: unstable without contact, infinite: above 1e9."""
     limit_lower: float
     """Stable with it, N/m, proved; NaN if nothing could be proved."""
     limit_upper: float
@@ -105,7 +105,7 @@ class Contact(Result):
     frequency: float
     """Of the motion that begins to grow there, rad/s."""
     stable_if_rigid: bool
-    """Stable where what is touched does not give way at all."""
+    """Stable with the tip held rigidly."""
     with_half_stiffness: float
     """The limit with half of the stiffness, N/m."""
     with_more_damping: float
@@ -115,22 +115,22 @@ class Contact(Result):
     passive: bool
     """Stable against everything that is passive."""
     missing_friction: float
-    """Viscous friction that each joint lacks for that below the Nyquist frequency, N m s/rad."""
+    """Viscous friction that each joint lacks for passivity below the Nyquist frequency, N m s/rad."""
     weight: Array
     """n, torque against gravity, N m."""
     effort: Array
-    """n, its limit, N m; 0 where it is not known."""
+    """n, its limit, N m; 0: unknown."""
     forces: Array
-    """8 x 6: direction in which the tip presses (3), force until a joint is at its limit (N), how far
-    the springs are then pressed in (m), and that joint, from 0; -1: none."""
+    """8 x 6: direction in which the tip presses (3), force at which a joint reaches its limit (N),
+    deflection of the springs there (m), and that joint, from 0; -1: none."""
     curve: Array
-    """s x 3, for each stiffness asked for: the stiffness (N/m), the least damping ratio, and the
+    """s x 3, for each `stiffness` of the call: the stiffness (N/m), the least damping ratio, and the
     natural frequency of that motion (rad/s)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Audit(Result):
-    """What `audit` found; None where it was not asked."""
+    """Result of `audit`; None for the parts that were not requested."""
 
     posture: PostureAudit | None
     workspace: WorkspaceAudit | None
@@ -167,7 +167,7 @@ def _damping(stiffness: npt.ArrayLike | None, damping: npt.ArrayLike | None,
 
 
 def _measured(robot: Robot, joints: Mapping[str, Any]) -> Array:
-    """Returns the positions of the robot's joints in a topic of JointState, where it has all."""
+    """Returns the positions of the robot's joints in the complete messages of a JointState topic."""
     names = [str(name) for name in joints.get("name", ())]
     missing = [name for name in robot.joint_names if name not in names]
     if missing or "position" not in joints:
@@ -195,7 +195,7 @@ def _task(robot: Robot, *, task_stiffness: npt.ArrayLike | None = None,
         raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
     factor_of = (damping_factor, None) if at_tip else (None, damping_factor)
     if not float(delay).is_integer():
-        raise Error(f"delay: {delay} is no whole number of ticks; is it in s?")
+        raise Error(f"delay: {delay} is not a whole number of ticks; is it in s?")
     chosen = selected(directions)
     stiffness = to_gain("task_stiffness", task_stiffness)
     damping = _damping(task_stiffness, task_damping, factor_of[0], "task_damping")
@@ -240,32 +240,31 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           postures: npt.ArrayLike | Mapping[str, Any] | None = None, outside_limits: bool = False,
           urdf_friction: bool = False,
           executor: concurrent.futures.Executor | None = None) -> Audit:
-    """Returns what gains really do on a robot, as their documentation states them.
+    """Returns what gains really do on a robot.
 
     At posture q (n, rad; without `samples` and `postures` the middle of the position limits): its
-    modes, smallest damping ratio, fastest pole and gain margin. Over
-    `samples` postures, spread evenly by a sequence of number `seed` between `lower` and `upper` (n,
-    rad; by default the position limits), or over `postures` (s x n, rad, or a topic of
-    JointState as read_log returns it, whose joints are found by name): the distributions of these
-    numbers. With a `damping_ratio`: damping
-    that gives every mode this ratio at q.
+    modes, smallest damping ratio, fastest pole and gain margin, and, with a `damping_ratio`, the
+    damping that gives every mode this ratio. Over many postures: the distributions of these
+    numbers. The postures are `samples` ones, spread evenly by a sequence of number `seed` between
+    `lower` and `upper` (n, rad; by default the position limits), or `postures` (s x n, rad, or a
+    topic of JointState as read_log returns it, whose joints are found by name).
 
-    Postures outside the position limits are refused, unless `outside_limits`. Viscous friction that
-    was stated for the robot damps beside the gains; that of its URDF does so with `urdf_friction`.
+    Postures outside the position limits are refused, unless `outside_limits`. Viscous friction
+    specified for the robot adds damping; the friction of its URDF does so only with `urdf_friction`.
 
-    Gains are those of `closed_loop`; `damping_factor` F stands for a damping of F sqrt(K), entry by
-    entry. With `half_quaternion` the controller takes half of the rotation vector for its error,
-    with `inertia_blocks` it multiplies gains by the tip's inertia, for translation and rotation
-    apart, with a `null_projector` of "kinematic" instead of "dynamic" null-space gains act through
+    Gains are as in `closed_loop`; `damping_factor` F stands for a damping of F sqrt(K), entry by
+    entry. With `half_quaternion` the controller's error is half of the rotation vector; with
+    `inertia_blocks` it multiplies gains by the tip's inertia, separately for translation and
+    rotation; with a `null_projector` of "kinematic" instead of "dynamic" null-space gains act through
     I - J^+ J. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
     (Hz; 0: none), `difference_velocity`, and an integral of the springs with `integral_time` (s; 0:
-    none), which counts in the gain margin alone. The torque against gravity is as late as the rest,
-    unless it is `ideal_gravity`, such as of a robot that holds itself. Where the robot has no
-    reflected inertia, the posture tells how much would be enough for a gain margin of `margin`. Modes
+    none), which affects only the gain margin. The torque against gravity is as late as the rest,
+    unless it is `ideal_gravity`, as of a robot that holds itself. If the robot lacks reflected
+    inertia, the posture has the inertia that would suffice for a gain margin of `margin`. Modes
     below `soft_frequency` (rad/s) are soft.
 
     An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
-    results are the same to the last bit whatever executor and however many workers.
+    results are the same to the last bit for any executor and number of workers.
 
     Raises Error for gains that are not symmetric positive semidefinite, or of another size. Raises
     concurrent.futures.BrokenExecutor, which says how many postures were done, if a worker dies and
@@ -308,9 +307,9 @@ def contact(robot: Robot, q: npt.ArrayLike | None = None, *,
             stiffness: npt.ArrayLike = (), period: float = 0.001, **stated: Any) -> Contact:
     """Returns what an arm may touch with its tip at posture q (n, rad; by default the middle of the
     position limits): a spring with a `damper` (N s/m) and a `mass` (kg) along a `direction` (3, in the
-    base's axes), or along the one that bears least.
+    base's axes), or along the direction with the lowest limit.
 
-    Gains and loop are stated by the keywords of `audit`. For each `stiffness` (N/m) the result has the
+    Gains and loop have the keywords of `audit`. For each `stiffness` (N/m) the result has the
     least damped motion.
 
     Raises Error like `audit`, for a direction of zero or in which the tip cannot move, and for a

@@ -73,7 +73,7 @@ def _column(values: list[Any]) -> npt.NDArray[Any] | None:
 
 
 def _joint_states(rows: list[dict[str, Any]]) -> Columns:
-    """Columns of JointState by the names of joints: several may share a topic, in any order."""
+    """Columns of JointState by the names of joints: messages may have them in any order."""
     places: dict[str, int] = {}
     for row in rows:
         for name in row["name"]:
@@ -102,7 +102,7 @@ class _Topics:
         try:
             fields: dict[str, Any] = {}
             _flatten(decode(), "", fields)
-        except Exception as error:  # whatever others' bytes make of it
+        except Exception as error:  # any kind, for bytes of other programs
             count, _ = self.failed.get(topic, (0, ""))
             self.failed[topic] = (count + 1, " ".join(str(error).split())[:200])
             return
@@ -195,7 +195,7 @@ def _read_rosbag(path: str, wanted: Callable[[str, str], bool], topics: _Topics)
 
 def read_bag(path: str, topics: Sequence[str] | None, types: Sequence[str] | None) -> (
         dict[str, Columns]):
-    """Returns the topics, or those of these names or message types, as read_log says."""
+    """Returns the topics, all or with these names or message types, as read_log does."""
     def wanted(topic: str, kind: str) -> bool:
         if topics is None and types is None:
             return True
@@ -213,7 +213,7 @@ def read_bag(path: str, topics: Sequence[str] | None, types: Sequence[str] | Non
         text = " ".join(str(error).split()) or type(error).__name__
         if not collected.rows:
             raise Error(f"{path}: {text}") from None
-        warnings.warn(f"{path}: {text}; what is before it was read", stacklevel=3)
+        warnings.warn(f"{path}: {text}; the part before it was read", stacklevel=3)
     for topic, (count, text) in collected.failed.items():
         warnings.warn(f"{path}: {topic}: {count} messages are not read: {text}", stacklevel=3)
     return {topic: collected.columns(topic) for topic in collected.rows}

@@ -23,8 +23,8 @@ from ._robot import is_cartesian, is_tool, selected
 
 
 class Status(enum.IntEnum):
-    """Result of one tick; of several the most severe, which stands last. From SETPOINT_STALE on the
-    torque is a safe one instead of the springs'; docs/safety.md describes each."""
+    """Result of one tick: the most severe of several, which is the last in this list. From
+    SETPOINT_STALE on a safe torque replaces the springs'; docs/safety.md describes each."""
 
     OK = 0
     TORQUE_LIMITED = 1
@@ -56,7 +56,6 @@ class Status(enum.IntEnum):
 
     @property
     def text(self) -> str:
-        """A short English text."""
         return _core.status_text(int(self))
 
 
@@ -67,7 +66,7 @@ class Setpoint(Result):
 
     joint_position: npt.ArrayLike | None = None
     """n, rad. Mode joint: the goal. Mode cartesian: the posture of the null-space springs; None
-    keeps the one in force."""
+    keeps the active one."""
     tip_pose: npt.ArrayLike | None = None
     """4 x 4, goal of mode cartesian."""
     wrench: npt.ArrayLike | None = None
@@ -94,7 +93,7 @@ class Setpoint(Result):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Snapshot(Result):
-    """What one tick measured and put out."""
+    """Input and output of one tick."""
 
     time: int
     """ns, of the state."""
@@ -125,17 +124,17 @@ class Snapshot(Result):
     tip_wrench: Array
     """6, of the Cartesian springs, dampers and feed-forward, N and N m."""
     joint_damping_ratio: float
-    """For which the damping of the joint springs in force is designed; 0: it is given."""
+    """Ratio for which the active joint damping is designed; 0: damping given as numbers."""
     task_damping_ratio: float
     """Likewise of the Cartesian springs."""
     damping_level: float
-    """Share of its ratio that the mode has that the sampled loop leaves least; 1: it bears all ratios."""
+    """Least share of its ratio that the sampled loop allows a mode; 1: no ratio is lowered."""
     energy_store: float
-    """Left in the energy tank, J; infinite if control.energy is free."""
+    """Energy in the tank, J; infinite if control.energy is free."""
     spring_share: float
-    """Of the springs' torque that the energy in the tank allows; 1: all."""
+    """Share of the springs' torque that the energy in the tank allows; 1: all."""
     payload_mass: float
-    """kg, with which the arm counts at this tick, on the way to that of set_payload."""
+    """kg, active at this tick; it changes gradually to the mass of set_payload."""
     payload_center: Array
     """3, of mass, m, from the tip link's origin in its axes."""
     payload_inertia: Array
@@ -199,7 +198,7 @@ class TrackedSampledModes(Result):
     spectral_radius: float
     gain_margin: float
     assumes: list[str]
-    """What the loop leaves out that the arm may have, such as "gravity ideal", "rotors unknown"."""
+    """Effects that the loop omits, such as "gravity ideal", "rotors unknown"."""
     time: int
     tick: int
     position: Array
@@ -218,9 +217,9 @@ def nanoseconds(time: float) -> int:
 class Ending:
     """How a loop ends: the arm stops, and then its torque fades to nothing."""
 
-    LONGEST = 1.0  # s; the torque fades then, whatever moves
-    LOOK = 0.1  # s between two looks at an arm that stops
-    STANDS = 1e-3  # rad between two looks at an arm that stands
+    LONGEST = 1.0  # s; the torque fades then in any case
+    LOOK = 0.1  # s between two checks of a stopping arm
+    STANDS = 1e-3  # rad between two checks: less is standstill
 
     def __init__(self, controller: Controller, fade: float) -> None:
         """`fade`: how long the torque fades, s."""
@@ -237,7 +236,7 @@ class Ending:
             self._controller.stop()
 
     def left(self, ns: int, q: Array) -> float:
-        """After that tick: the share of its torque that is to act, 0 at the end."""
+        """After that tick: the share of its torque to apply, 0 at the end."""
         if self._fading is None and self._stands(ns, q):
             self._fading = ns
         return 1.0 if self._fading is None else max(0.0, 1 - 1e-9 * (ns - self._fading) / self._fade)
@@ -296,9 +295,8 @@ class Controller:
 
         `time` is of the state, on any clock that does not run backward: seconds as a float, or
         nanoseconds as an integer. q and qd (n, rad and rad/s) are measured. Without a set-point the
-        last one stays in force. `external_wrench` (6) is what the world exerts on the tip. The
-        torque is safe to send with every status; a state that is no good gives a status, not an
-        exception.
+        last one stays active. `external_wrench` (6) is the wrench of the world on the tip. The
+        torque is safe to send with every status; a bad state gives a status, not an exception.
         """
         torque, status = self._core.update(
             nanoseconds(time), np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64),
@@ -308,7 +306,7 @@ class Controller:
 
     def needs_brakes(self) -> bool:
         """True if, after the last update, the host has to end the motion at once and to engage the
-        robot's own brakes: no torque is known to be right, or the state is lost."""
+        robot's own brakes: no torque is known to be safe, or the state is lost."""
         return self._core.needs_brakes()
 
     def start(self, q: npt.ArrayLike, torque: npt.ArrayLike | None = None) -> None:
@@ -324,7 +322,7 @@ class Controller:
         self._core.reset(_column(to_vector("torque", torque)))
 
     def stop(self) -> None:
-        """Stops the arm, before the loop ends: the set-point is given up, until there is a new one."""
+        """Stops the arm, before the loop ends: discards the set-point."""
         self._core.stop()
 
     def release(self) -> None:
@@ -332,8 +330,8 @@ class Controller:
         self._core.release()
 
     def set_setpoint(self, setpoint: Setpoint | None = None, **parts: Any) -> None:
-        """Sets the set-point that the next tick takes up: a Setpoint, or what makes one. Raises
-        Error for one that is not possible."""
+        """Sets the set-point for the next tick: a Setpoint, or its parts. Raises Error for an
+        impossible one."""
         wanted = Setpoint(**parts) if setpoint is None else setpoint
         self._core.set_setpoint(*wanted._parts())
 
@@ -347,11 +345,11 @@ class Controller:
                   null_damping: npt.ArrayLike | None = None,
                   null_damping_ratio: float | None = None, frame: str | None = None,
                   directions: Sequence[str] | None = None) -> None:
-        """Sets gains that the next tick takes up; None keeps one as it is. Matrices (n x n, 6 x 6)
-        may be given as their diagonals, null_stiffness and null_damping have n entries. Raises Error
-        for gains that are not possible, or leave the sampled loop too small a gain margin. Warns,
-        once of each, of ones that are taken with too small a margin because it was smaller before,
-        and of ones that look like another unit or order."""
+        """Sets gains for the next tick; None keeps a gain. Matrices (n x n, 6 x 6) may be given as
+        their diagonals, null_stiffness and null_damping have n entries. Raises Error for impossible
+        gains, and for gains with too small a gain margin of the sampled loop. Warns, once of each
+        kind, if such gains are accepted because the margin was smaller before, and of gains that
+        look like another unit or order."""
         given = {key: value for key, value in locals().items() if key != "self"}
         text = self._core.set_gains(_gains(given))
         kind = re.sub(r"\d[\d.e+-]*", "#", text)
@@ -363,11 +361,11 @@ class Controller:
                     inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)), *,
                     tool: npt.ArrayLike | None = None,
                     gains: Mapping[str, Any] | None = None) -> None:
-        """Tells what the arm carries from the next tick on: mass (kg), centre (3, m, in the tip
-        link) and inertia about it (3 x 3, kg m^2), and the pose of the tool in the tip link (4 x 4;
-        None keeps it). `gains`, as for set_gains, come with it in the same tick. Weight and modes
-        follow within motion.gain_time. Raises Error for what no body can be, what the torque limits
-        do not hold, and what leaves the gains too small a margin. Warns as set_gains does."""
+        """Sets the payload from the next tick on: mass (kg), centre (3, m, in the tip link) and
+        inertia about it (3 x 3, kg m^2), and the pose of the tool in the tip link (4 x 4; None keeps
+        it). `gains`, as for set_gains, take effect in the same tick. Weight and modes follow within
+        motion.gain_time. Raises Error for a physically impossible payload, for one that the torque
+        limits cannot hold, and if the gains then have too small a margin. Warns as set_gains does."""
         _warn(self._core.set_payload(float(mass), to_numbers("center", center, 1).reshape(-1, 1),
                                      to_numbers("inertia", inertia, 2),
                                      None if tool is None else to_numbers("tool", tool, 2),
@@ -375,22 +373,22 @@ class Controller:
 
     def limit_tip_speed(self, *, linear: float | None = None, angular: float | None = None,
                         limit: float | None = None) -> None:
-        """Limits the tip's speed from the next tick on: of the reference on its way (m/s, rad/s) and
-        of the tip itself, beyond which it is a fault (m/s). None is what the configuration says,
-        which is the most that is allowed. Raises Error for more, and for zero or less."""
+        """Limits the tip's speed from the next tick on: of the moving reference (m/s, rad/s), and of
+        the tip itself, where a higher speed is a fault (m/s). None is the configuration's limit,
+        which is also the largest allowed. Raises Error for more, and for zero or less."""
         self._core.limit_tip_speed(*(math.inf if one is None else float(one)
                                      for one in (linear, angular, limit)))
 
     def judge_gains(self, position: npt.ArrayLike | None = None, **gains: Any) -> float:
         """Returns the gain margin of the sampled loop at `position` (n, rad; None: the latest) with
-        gains as in set_gains, those of the configuration by default: at most limits.gain_margin,
+        gains as in set_gains, by default the configuration's: at most limits.gain_margin,
         below 1 if the loop is unstable."""
         return self._core.judge_gains(_column(to_vector("position", position)), _gains(gains))
 
     def publish(self, *urls: str) -> None:
         """Publishes states and modes of every tick over LCM from now on, as docs/plugin.md says, on
-        each of these buses, or else on that of LCM_DEFAULT_URL or of this machine:
-        "file:///tmp/arm.lcm?mode=w" writes a log. A thread without Python does it, which alone may
+        each of these buses; without one on the bus of LCM_DEFAULT_URL or of this machine.
+        "file:///tmp/arm.lcm?mode=w" writes a log. A thread without Python publishes, and only it may
         read results: until `stop_publishing`, snapshot, modes and sampled_modes raise Error."""
         self._core.publish("\n".join(urls))
 
@@ -399,9 +397,9 @@ class Controller:
         self._core.stop_publishing()
 
     def modes_at(self, q: npt.ArrayLike, mode: str | None = None, **gains: Any) -> TrackedModes:
-        """Returns the modes at rest at q (n, rad), as a loop would publish them; none has to run.
-        `mode` is joint or cartesian (None: that of the configuration), gains are as in set_gains,
-        those of the configuration by default. Shapes as the configuration asks for them."""
+        """Returns the modes at rest at q (n, rad), as a loop would publish them, without a running
+        loop. `mode` is joint or cartesian, and gains are as in set_gains; the configuration has the
+        defaults, and decides whether there are shapes."""
         return self._modes_at(q, mode, gains)[0]
 
     def _modes_at(self, q: npt.ArrayLike, mode: str | None, gains: dict[str, Any]
@@ -412,7 +410,7 @@ class Controller:
         return _tracked(found), jacobian, place
 
     def snapshot(self) -> Snapshot | None:
-        """Returns what the latest tick measured and put out; None before the first."""
+        """Returns the input and output of the latest tick; None before the first."""
         found = self._core.snapshot()
         if found is None:
             return None
@@ -420,13 +418,13 @@ class Controller:
                            "fault": Status(found["fault"])})
 
     def modes(self) -> TrackedModes | None:
-        """Returns the modes of the latest tick that was analysed; None as long as there are none."""
+        """Returns the modes of the latest analysed tick; None before the first."""
         found = self._core.modes()
         return None if found is None else _tracked(found)
 
     def sampled_modes(self) -> TrackedSampledModes | None:
-        """Returns the latest analysis of the sampled loop (analysis.sampled.interval); None as long
-        as there is none."""
+        """Returns the latest analysis of the sampled loop (analysis.sampled.interval); None before
+        the first."""
         found = self._core.sampled_modes()
         if found is None:
             return None

@@ -17,8 +17,8 @@ from ._results import Array, ComplexArray, Result, TextArray, stack, table, to_n
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class MeasuredModes(Result):
-    """m modes that records show, by rising natural frequency. Standard deviations (std) are those
-    of the estimates."""
+    """m modes that records show, by rising natural frequency, with standard deviations (std) of the
+    estimates."""
 
     natural_frequency: Array
     """m, rad/s."""
@@ -37,7 +37,7 @@ class MeasuredModes(Result):
     energy: Array
     """m, its share of the motion."""
     reason: TextArray
-    """m, why it is rejected; empty if it is not."""
+    """m, why it is rejected; empty if it is believed."""
 
     def __len__(self) -> int:
         return len(self.natural_frequency)
@@ -57,15 +57,15 @@ class Identification(Result):
 
     modes: MeasuredModes
     rejected: MeasuredModes
-    """What was found and is not believed, with reasons."""
+    """Modes that are not believed, with reasons."""
     parts: list[tuple[int, float, float]]
-    """The parts that were used: number of the record, begin and end, s."""
+    """The parts that were used: number of the record, beginning and end, s."""
     verdict: str
     """What the records show: "decay", "ambient" or "driven"."""
     noise: Array
-    """Of each channel, standard deviation of what the model leaves over."""
+    """Standard deviation of the residual of each channel."""
     whiteness: float
-    """Factor on variances, above 1 where what is left over is not white."""
+    """Factor on variances, above 1 if the residual is not white."""
     explained: float
     """Share of the squares of the motion that the model explains; with ambient=True of the
     correlations of one half of the records by the other half's model."""
@@ -106,7 +106,7 @@ def _topic(joints: Mapping[str, Any]) -> tuple[Array, Array]:
     """Times and positions of a topic of JointState, of the joints and messages that have both."""
     for field in ("time", "position"):
         if field not in joints:
-            raise Error(f"identify: the topic has no {field}, as that of a JointState would")
+            raise Error(f"identify: the topic has no {field}, which a topic of JointState has")
     position = np.asarray(joints["position"], float)
     seen = np.isfinite(position)
     position = position[:, seen.mean(axis=0) > 0.5]  # without joints that others publish
@@ -119,27 +119,26 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike] | Mapping[str, Any],
              y: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None, *,
              input: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None, find: bool = True,
              ambient: bool = False, max_order: int = 0) -> Identification:
-    """Returns the modes that records of motion show: of free decays, of motion under inputs that
-    were measured, or of ambient motion.
+    """Returns the modes that records of motion show: free decays, motion under measured inputs, or
+    ambient motion.
 
     `t` has the times (N, s, rising, not necessarily even) and `y` the channels (N x channels, or N
-    for one channel) of a record; NaN is a sample that is missing. Instead of both, `t` may be a
+    for one channel) of a record; NaN is a missing sample. Instead of both, `t` may be a
     topic of JointState as read_log returns it, whose positions are the channels. Lists of such
-    arrays are several records at one posture. By its motion a record is one with free decays, after
-    a push, a release or a step, which are found, or ambient (below); records of another kind than
-    the first are left out. With find=False each record is one free decay. With `input` (N x inputs,
-    or N for one input; nothing missing; a list of such arrays for several records) the records are
-    taken whole: what moved the arm from each sample to the next, from outside, as a chirp or pulses
-    (least squares in the frequency domain with one denominator, Guillaume et al. 2003, refined to
-    the maximum of the likelihood); inputs that rest are left out. With ambient=True the records are
-    those of an arm that many small, irregular forces shake, which nobody measured, for a minute or
-    more (covariance- driven stochastic subspace identification, Peeters and De Roeck 1999).
-    `max_order` bounds the order of the models tried (0: 2 for each channel, at least 12; of ambient
-    motion 4 for each channel and 4 more, at most 40; with inputs 2 for each channel and 16 more, at
-    most 32).
+    arrays are several records at one posture. The motion decides whether a record has free decays,
+    after a push, a release or a step, which are searched for, or is ambient; records of another kind
+    than the first are left out. With find=False each record is one free decay. `input` (N x inputs,
+    or N for one input; no missing samples; a list of such arrays for several records) is what moved
+    the arm from outside from each sample to the next, such as a chirp or pulses. It explains the
+    whole records (least squares in the frequency domain with one denominator, Guillaume et al. 2003,
+    refined to the maximum of the likelihood); constant inputs are left out. With ambient=True many
+    small, irregular, unmeasured forces shake the arm for a minute or more (covariance-driven
+    stochastic subspace identification, Peeters and De Roeck 1999). `max_order` bounds the order of
+    the models tried (0: 2 for each channel, at least 12; for ambient motion 4 for each channel and 4
+    more, at most 40; with inputs 2 for each channel and 16 more, at most 32).
 
-    Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, where
-    nothing moves freely, limit cycles, inputs of which none moves, and for ambient motion that is too short.
+    Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, records
+    without free motion, limit cycles, inputs that are all constant, and too short ambient motion.
     """
     if isinstance(t, Mapping):
         if y is not None:
@@ -158,7 +157,7 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike] | Mapping[str, Any],
     if input is None:
         inputs = [np.empty((0, 0))] * len(times)
     elif ambient:
-        raise Error("identify: ambient motion is that whose input was not measured")
+        raise Error("identify: ambient motion has no measured input")
     else:
         inputs = _columns("input", "inputs", input, len(times), many)
         _check_rows("input", "inputs", inputs, instants)

@@ -20,10 +20,10 @@ import numpy as np
 from ._controller import Controller
 from ._core import Error
 
-TORQUE_RATE = 1000.0  # N m/s that the robot bears
+TORQUE_RATE = 1000.0  # N m/s, the robot's limit
 UPRIGHT = 0.9998  # cosine of the largest angle of an upright base, 1 degree
-TORQUE = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # N m, likewise
-LONGEST = 10_000  # us; answers that took longer count as this
+TORQUE = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # N m, the robot's limits
+LONGEST = 10_000  # us; slower answers count as this
 
 RECOVER = ("then python -c \"import pylibfranka; "
            "pylibfranka.Robot('{robot}').automatic_error_recovery()\"")
@@ -67,7 +67,7 @@ def advice(text: str, robot: str) -> str:
 
 
 def check_loop(controller: Controller) -> dict[str, Any]:
-    """Returns what the controller knows of its loop; raises Error unless libfranka's is the same."""
+    """Returns the controller's data of its loop; raises Error unless they fit libfranka's loop."""
     loop = controller._core.loop()
     if controller.joints != 7:
         raise Error(f"robot: has {controller.joints} joints from base to tip, the robot 7")
@@ -91,12 +91,12 @@ def check_loop(controller: Controller) -> dict[str, Any]:
         if len(over):
             joint = int(over[0])
             raise Error(f"limits.{key}: {loop[key][joint]:g} of joint {joint + 1} is more than the "
-                        f"{most[joint]:g} that the robot bears")
+                        f"{most[joint]:g} that the robot allows")
     return dict(loop)
 
 
 class Answers:
-    """How long answers took, in us, from the arrival of a state to the torque that was written."""
+    """Times of answers, us, from the arrival of a state until the torque is written."""
 
     def __init__(self) -> None:
         self.counts = [0] * (LONGEST + 1)
@@ -125,8 +125,8 @@ class Answers:
 
 
 class Wire:
-    """The socket on which libfranka hears states, found among what the connection has opened. It is
-    waited for here, because pylibfranka waits with the interpreter's lock."""
+    """The socket on which libfranka receives states, found among the files that the connection has
+    opened. The loop waits on it here, because pylibfranka waits with the interpreter's lock."""
 
     STAMP = 0x8907  # SIOCGSTAMPNS: when the kernel got what was read last
 
@@ -143,7 +143,7 @@ class Wire:
                     heard.close()
 
     def wait(self, seconds: float) -> bool:
-        """Waits for a state; True if there is one, or if the socket is not known."""
+        """Waits for a state; True if there is one, or if the socket is unknown."""
         return self._socket is None or bool(self._poll.poll(1000 * seconds))
 
     def arrived(self) -> int:
@@ -169,7 +169,7 @@ def open_files() -> set[str]:
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
-    """Keeps the interpreter from what may take long, and this thread ahead of others if allowed."""
+    """Turns garbage collection off, and gives this thread priority if the system allows it."""
     interval = sys.getswitchinterval()
     collecting = gc.isenabled()
     gc.collect()
@@ -197,7 +197,7 @@ def exceptions(franka: Any) -> tuple[type[BaseException], ...]:
 
 
 def is_realtime() -> bool:
-    """True if the kernel is one with PREEMPT_RT, which libfranka then insists on."""
+    """True if the kernel has PREEMPT_RT, which libfranka then requires."""
     try:
         with open("/sys/kernel/realtime", encoding="ascii") as file:
             return file.read(1) == "1"

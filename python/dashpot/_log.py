@@ -36,11 +36,11 @@ class LoggedMode(Result):
     kind: TextArray
     """k of underdamped, critical, overdamped, undamped, unstable, soft."""
     error_bound: Array
-    """k, proved bound of either eigenvalue, 1/s; infinite: none was proved."""
+    """k, proved bound of either eigenvalue, 1/s; infinite: not proved."""
     natural_frequency_bound: Array
-    """k, the same of the natural frequency, rad/s."""
+    """k, proved bound of the natural frequency, rad/s."""
     damping_ratio_bound: Array
-    """k, the same of the damping ratio."""
+    """k, proved bound of the damping ratio."""
     joint_position: Array
     """k x n, the configurations, rad (m)."""
     shapes: ComplexArray
@@ -56,8 +56,8 @@ class Log(dict[str, dict[str, npt.NDArray[Any]]]):
 
     @property
     def modes(self) -> dict[int, LoggedMode]:
-        """Returns the modes on DASHPOT_MODES by label, which stays with a mode from message to
-        message; empty where the log has none."""
+        """Returns the modes on DASHPOT_MODES by label, which a mode keeps from message to message;
+        empty if the log has none."""
         fields = self.get("DASHPOT_MODES")
         if not fields or "label" not in fields:
             return {}
@@ -90,23 +90,22 @@ def _logged_mode(fields: dict[str, npt.NDArray[Any]], rows: IntArray, columns: I
 def read_log(path: str | os.PathLike[str], *, topics: Sequence[str] | None = None,
              types: Sequence[str] | None = None) -> Log:
     """Returns an LCM log, a rosbag or an MCAP file as a dict of channel (topic) to its messages, a
-    dict of field to array, and its `modes` by label. `topics` are names of those wanted; `types` are
-    message types, such as "sensor_msgs/msg/JointState" or "JointState", whose topics are wanted
-    besides (not in LCM logs).
+    dict of field to array, and its `modes` by label. `topics` selects topics by name; `types` adds
+    topics by message type, such as "sensor_msgs/msg/JointState" or "JointState" (not in LCM logs).
 
     Fields have the names of the messages, parts of fields after a point (pose.position.x), and the
-    first index of each array counts the messages. Where messages have different sizes, what is
-    missing is NaN, or -1 in arrays of integers of LCM. The field log_utime is when the log got the
+    first index of each array counts the messages. If messages have different sizes, missing entries
+    are NaN, or -1 in arrays of integers of LCM. The field log_utime is when the log got the
     message, us since 1970-01-01 UTC; LCM channels of other programs have no other field. `time` is
     the stamp of a ROS header, s. A JointState has `position`, `velocity` and `effort`, messages x
     joints, with a column for each joint in `name` on the topic, NaN where a message does not have
     it.
 
     Rosbags are read through the package rosbags, MCAP files through mcap, both from PyPI; messages
-    in an MCAP file may be JSON, as dashpot export writes them, or those of ROS 2.
+    in an MCAP file may be JSON, as dashpot export writes them, or messages of ROS 2.
 
-    Raises Error for a file that cannot be read. Warns of a damaged log, and of messages that cannot
-    be read or are none of Dashpot's on its channels; both are left out.
+    Raises Error for a file that cannot be read. Warns of a damaged log, of unreadable messages, and
+    of foreign messages on Dashpot's channels; such messages are left out.
     """
     file = os.fspath(path)
     if is_bag(file):

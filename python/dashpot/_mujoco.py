@@ -1,4 +1,4 @@
-"""An arm of a MuJoCo model as a URDF with what a URDF has no place for."""
+"""An arm of a MuJoCo model as a URDF, with the properties that a URDF lacks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Arm:
 
 
 def load(model: Any) -> tuple[Any, str]:
-    """Returns the MjModel that `model` is or is the path of, and its name in messages."""
+    """Returns an MjModel, given as such or as a path, and its name in messages."""
     if not isinstance(model, (str, os.PathLike)):
         return model, "MjModel"
     path = os.fspath(model)
@@ -61,8 +61,8 @@ def _pose(position: Any = (0, 0, 0), rotation: Any = None) -> Array:
 
 
 def rpy_of(R: Array) -> tuple[float, float, float]:
-    """Returns roll, pitch and yaw of a rotation. Yaw is taken out first, then pitch, so that their
-    product is right where yaw and roll turn about one axis, too."""
+    """Returns roll, pitch and yaw of a rotation. Yaw is computed first, then pitch, so that their
+    product is correct even if yaw and roll turn about one axis."""
     yaw = np.arctan2(R[1, 0], R[0, 0])
     c, s = np.cos(yaw), np.sin(yaw)
     pitch = np.arctan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
@@ -101,7 +101,7 @@ class _Writer:
         return self.name_of(self.mujoco.mjtObj.mjOBJ_BODY, body, "body")
 
     def link(self, name: str, body: int | None = None) -> str:
-        """Adds a link, with the inertia of `body`; returns its name, which no other link has."""
+        """Adds a link, with the inertia of `body`; returns its unique name."""
         while name in self.links:
             name += "_"
         self.links.add(name)
@@ -132,7 +132,7 @@ class _Writer:
         return _pose(self.model.body_pos[body], _rotation(self.model.body_quat[body]))
 
     def effort(self, joint: int) -> float:
-        """What the actuators of the joint, or its own limit, let through, N m; 0 if anything."""
+        """Torque limit by the joint's actuators and its own limit, N m; 0: no limit."""
         m, most = self.model, 0.0
         gain, bias = int(self.mujoco.mjtGain.mjGAIN_FIXED), int(self.mujoco.mjtBias.mjBIAS_NONE)
         at_joint = int(self.mujoco.mjtTrn.mjTRN_JOINT)
@@ -155,7 +155,7 @@ class _Writer:
         return float(most) if np.isfinite(most) else 0.0
 
     def moving(self, parent: str, j: int, pose: Array) -> tuple[str, Array]:
-        """Adds joint j; returns its link, and the pose in this of the body, less later joints."""
+        """Adds joint j; returns its link, and the body's pose in this link without later joints."""
         m, mjt = self.model, self.mujoco.mjtJoint
         name = self.name_of(self.mujoco.mjtObj.mjOBJ_JOINT, j, "joint")
         if m.jnt_type[j] not in (int(mjt.mjJNT_HINGE), int(mjt.mjJNT_SLIDE)):
@@ -180,7 +180,7 @@ class _Writer:
         return child, back @ _pose(-anchor)
 
     def hang(self, body: int, link: str, but: int) -> None:
-        """Adds what hangs on a body, rigid at the reference position, but for one branch."""
+        """Adds the branches of a body, rigid at the reference position, except the branch `but`."""
         open_bodies = [(body, link)]
         while open_bodies:
             at, parent = open_bodies.pop()
@@ -190,7 +190,7 @@ class _Writer:
                                                           self.body_pose(child), child)))
 
     def warn(self) -> None:
-        """Of what acts on the chain in MuJoCo and in no Robot."""
+        """Warns of effects on the chain that MuJoCo has and a Robot lacks."""
         m, said = self.model, []
         if np.any(np.asarray(m.jnt_stiffness)[self.joints]):
             said.append("springs of joints (stiffness) are left out")

@@ -17,22 +17,22 @@ from ._workers import Task, chunks_of, collect, workers
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class RegionDesign(Result):
-    """One positive semidefinite damping matrix, and the worst that it does."""
+    """One positive semidefinite damping matrix, and its worst results."""
 
     damping: Array
     """6 x 6 in the axes of the gains' frame, or n x n for joint springs."""
     level: float
-    """Smallest ratio over all postures, relative to the ratio wanted, at most 1."""
+    """Smallest ratio over all postures, relative to the wanted ratio, at most 1."""
     violation: float
-    """By how much a ratio exceeds the largest one allowed."""
+    """By how much a ratio exceeds the largest allowed ratio."""
     worst_q: Array
-    """n, rad, the posture of the smallest ratio; no entries if no posture has a ratio."""
+    """n, rad, the posture of the smallest ratio; empty if no posture has a ratio."""
     share: float
-    """Of the damping found for continuous loops, the share that the sampled loops bear, at most 1."""
+    """Share of the damping for continuous loops with which the sampled loops keep their margin."""
     gain_margin: float
     """Smallest over all postures; infinite without a period."""
     margin_q: Array
-    """n, rad, the posture of the smallest gain margin; no entries without a period."""
+    """n, rad, the posture of the smallest gain margin; empty without a period."""
 
 
 def design_region(robot: Robot, *, damping_ratio: float = 0.7,
@@ -52,22 +52,22 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     """Returns one constant damping matrix for many postures, as `dashpot design --region` does.
 
     It seeks the largest level such that every mode at every posture has at least level times
-    `damping_ratio`, and none more than `largest_ratio` (by default 1, or 1.5 times the ratio wanted
-    if that is more). Postures, springs and null-space gains are those of `audit`; `structure` is
+    `damping_ratio`, and at most `largest_ratio` (by default 1, or 1.5 times the wanted ratio
+    if that is more). Postures, springs and null-space gains are as in `audit`; `structure` is
     full, block or diagonal. Modes below `soft_frequency` (rad/s) do not count.
 
-    With a `period` (s) the matrix is lowered as a whole to what the sampled loop of every posture
-    bears with the `gain_margin`. The loop is that of `audit`: `delay` (ticks), `cutoff` (Hz),
+    With a `period` (s) the matrix is lowered as a whole until the sampled loop of every posture
+    keeps the `gain_margin`. The loop is as in `audit`: `delay` (ticks), `cutoff` (Hz),
     `difference_velocity`, `integral_time` (s), `ideal_gravity`.
 
-    Only postures that bind are searched over. An `executor` of concurrent.futures judges all of
-    them in chunks, where the workers are, and only the few that come off worst come back. The result
-    is the same to the last bit whatever executor and however many workers.
+    The search uses only postures that limit the result. The workers of an `executor` of
+    concurrent.futures judge all postures in chunks, and return only the few worst ones. The result
+    is the same to the last bit for any executor and number of workers.
 
-    Warns where the damping has less than a tenth of the ratio wanted at some posture, or more than the
-    largest one allowed.
+    Warns if a ratio at some posture is less than a tenth of the wanted ratio, or more than the
+    largest allowed ratio.
 
-    Raises Error and BrokenExecutor as `audit` does, and Error without postures and where no share of
+    Raises Error and BrokenExecutor as `audit` does, and Error without postures and if no share of
     the damping keeps the gain margin.
     """
     if (task_stiffness is None) == (joint_stiffness is None):
@@ -110,9 +110,9 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
                     f"the largest is {found['gain_margin']:.3g}, with {found['share']:.3g} of it")
     region = RegionDesign(**found)
     if region.violation > 1e-6:
-        warnings.warn("design_region: what is there already damps more than largest_ratio allows, by "
+        warnings.warn("design_region: the existing damping exceeds largest_ratio by "
                       f"{region.violation:.3g}", stacklevel=2)
     elif region.level < 0.1:
-        warnings.warn(f"design_region: the smallest ratio is {region.level:.3g} of the one wanted; "
-                      "largest_ratio or the structure binds", stacklevel=2)
+        warnings.warn(f"design_region: the smallest ratio is {region.level:.3g} of the wanted ratio; "
+                      "largest_ratio or the structure limits it", stacklevel=2)
     return region

@@ -1,4 +1,4 @@
-"""What all results share: they cannot be changed, print themselves, and can be pickled."""
+"""The base of all results: read-only, with a text, and fit for pickling."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def table(columns: dict[str, Sequence[object]]) -> str:
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Modes(Result):
     """The m vibration modes of M q'' + C q' + K q = 0 with n coordinates, as `dashpot analyze` lists
-    them: by falling natural frequency. Bounds are proved: the true number is that near.
+    them: by falling natural frequency. The true number is proved to lie within each bound.
     """
 
     natural_frequency: Array
@@ -78,13 +78,13 @@ class Modes(Result):
     kind: TextArray
     """m of underdamped, critical, overdamped, undamped, unstable, soft."""
     error_bound: Array
-    """m, proved bound of |computed - true| of either eigenvalue, 1/s; infinite: none was proved."""
+    """m, proved bound of |computed - true| of either eigenvalue, 1/s; infinite: not proved."""
     eigenvalue_bounds: Array
-    """m x 2, the same of each of `eigenvalues`, 1/s; error_bound is the larger one."""
+    """m x 2, proved bound of each of `eigenvalues`, 1/s; error_bound is the larger one."""
     natural_frequency_bound: Array
-    """m, the same of the natural frequency, rad/s."""
+    """m, proved bound of the natural frequency, rad/s."""
     damping_ratio_bound: Array
-    """m, the same of the damping ratio."""
+    """m, proved bound of the damping ratio."""
     backward_error: Array
     """m, normwise backward error of the worse eigenpair (Tisseur 2000)."""
     condition: Array
@@ -111,19 +111,19 @@ class Modes(Result):
 
 
 def stack(items: Sequence[Any], shape: tuple[int, ...], dtype: type = float) -> npt.NDArray[Any]:
-    """Returns equally sized arrays as one array, also if there is none of them."""
+    """Returns equally sized arrays as one array, also for an empty list."""
     return np.array(items, dtype=dtype).reshape((len(items), *shape))
 
 
 def make_modes(found: dict[str, Any]) -> Modes:
-    """Returns the dataclass of what C++ found."""
+    """Returns the Modes of a result of C++."""
     n = found["zero_modes"].shape[1]
     return Modes(**{**found, "shapes": stack(found["shapes"], (n,), complex),
                     "kind": np.array(found["kind"], dtype=np.str_)})
 
 
 def to_numbers(name: str, given: npt.ArrayLike, dimensions: int) -> Array:
-    """Returns `given` as an array of floats of its own; raises Error if it is none."""
+    """Returns `given` as an own array of floats; raises Error if it cannot be one."""
     try:
         raw = np.asarray(given)
         if raw.dtype.kind == "c":

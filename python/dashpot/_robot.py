@@ -76,7 +76,7 @@ def _expand(path: str, arguments: Mapping[str, str]) -> str:
         if package.__name__ == "xacro":
             return str(package.process_file(path, mappings=dict(arguments)).toxml())
         return str(package.XacroDoc.from_file(path, subargs=dict(arguments)).to_urdf_string())
-    except Exception as error:  # whatever the file makes of it
+    except Exception as error:  # any kind, depending on the file
         raise Error(f"{path}: xacro: {' '.join(str(error).split())}") from None
 
 
@@ -94,9 +94,9 @@ class Robot:
     """n, position limits, rad; -infinity for a continuous joint."""
     upper: Array
     velocity: Array
-    """n, velocity limits, rad/s; infinite if there is none."""
+    """n, velocity limits, rad/s; infinite: no limit."""
     effort: Array
-    """n, torque limits, N m; infinite if there is none."""
+    """n, torque limits, N m; infinite: no limit."""
     viscous_friction: Array
     """n, N m s/rad."""
     coulomb_friction: Array
@@ -104,15 +104,14 @@ class Robot:
     reflected_inertia: Array
     """n, of rotors and gears, kg m^2."""
     acceleration: Array
-    """n, limits of acceleration, rad/s^2, which URDF has from version 1.2 on; infinite if there is
-    none."""
+    """n, limits of acceleration, rad/s^2, of URDF 1.2 and later; infinite: no limit."""
     deceleration: Array
     jerk: Array
     """n, rad/s^3; likewise."""
     warnings: tuple[str, ...]
-    """What is doubtful about the description though it was read."""
+    """Doubtful entries of the description."""
     gear_stiffness: Array
-    """n, N m/rad; infinite where the gear does not bend."""
+    """n, N m/rad; infinite: rigid."""
     gear_damping: Array
     """n, N m s/rad, beside gear_stiffness."""
 
@@ -148,21 +147,21 @@ class Robot:
 
         `gravity` (3, m/s^2) is in the axes of the file's root link, by default 9.81 along -z.
         Fingers and other links off the chain count as rigid at their zero position unless
-        `include_off_chain` is False. `accept_inertias` takes inertias that no body can have,
-        of all links or of those that it names.
-        `drives` names public figures of reflected inertia, see published_drives, or a drives file
-        of `dashpot calibrate` (.yaml), whose friction takes the place of the URDF's with
-        `drives_friction`.
+        `include_off_chain` is False. `accept_inertias` accepts physically impossible inertias
+        unchanged, for all links or for the named ones.
+        `drives` names public values of reflected inertia, see published_drives, or a drives file
+        of `dashpot calibrate` (.yaml); with `drives_friction` their friction replaces the URDF's.
         `reflected_inertia` (n, kg m^2), `viscous_friction` (n, N m s/rad) and `coulomb_friction`
-        (n, N m) replace these and the URDF's. Gears bend with `gear_stiffness` (n, N m/rad,
-        numpy.inf: rigid) and `gear_damping` (n, N m s/rad) between a motor that has the reflected
-        inertia and its link; `position_sensor` (motor or link) says which of the two is measured.
+        (n, N m) replace the values of the drives and of the URDF. Elastic gears have
+        `gear_stiffness` (n, N m/rad, numpy.inf: rigid) and `gear_damping` (n, N m s/rad) between a
+        motor with the reflected inertia and its link; `position_sensor` says which of the two is
+        measured, motor or link.
         A payload at the tip has `payload_mass` (kg), `payload_center`
         (3, m, in the tip link) and `payload_inertia` (3 x 3, kg m^2, about that centre). `tool` is
         the pose (4 x 4) of the tool's frame in the tip link; the tip is then this frame.
 
-        Raises Error that names file, joint or link and reason, and warns of what is doubtful, as a
-        mass that is hardly one in kg.
+        Raises Error that names file, joint or link and reason, and warns of doubtful values, such as
+        a mass that is probably not in kg.
         """
         options: dict[str, Any] = {
             "gravity": gravity, "include_off_chain": include_off_chain,
@@ -189,12 +188,12 @@ class Robot:
                     reflected_inertia: npt.ArrayLike | None = None, **options: Any) -> Robot:
         """Reads the chain from body `base` to body or site `tip` of a mujoco.MjModel, or of the
         MJCF or MJB file at the path `model`, with armature as reflected inertia, damping, dry
-        friction, gravity, and the limits of positions and actuators. Positions q are those of
+        friction, gravity, and the limits of positions and actuators. Positions q are the same as in
         MuJoCo. Bodies off the chain count as rigid at the model's reference position (qpos0).
 
-        `gravity` is in the axes of the model's world; other `options` are those of from_urdf:
+        `gravity` is in the axes of the model's world; other `options` are as in from_urdf:
         viscous_friction, coulomb_friction, the payload and the tool. Raises Error for ball and free
-        joints on the chain, and warns of what it leaves out.
+        joints on the chain, and warns of omitted effects.
         """
         loaded, name = _mujoco.load(model)
         arm = _mujoco.read_arm(loaded, name, base, tip)
@@ -218,8 +217,8 @@ class Robot:
         return urdf, config
 
     def _for_gains(self, urdf_friction: bool) -> Robot:
-        """Returns the robot without the viscous friction of its URDF, unless that is asked for or
-        other friction is stated."""
+        """Returns the robot without the viscous friction of its URDF, unless `urdf_friction` is true
+        or other friction is specified."""
         urdf, base, tip, file, options = self._arguments
         stated = options.get("viscous_friction") is not None or options.get("drives_friction")
         if urdf_friction or stated or not self.viscous_friction.any():
@@ -245,12 +244,12 @@ class Robot:
 
     @property
     def missing_rotors(self) -> str:
-        """Which joints have no reflected inertia, so that fast modes and gain margins are wrong;
-        empty if all have."""
+        """Names of the joints without reflected inertia, which makes fast modes and gain margins
+        wrong; empty if all have it."""
         return self._core.missing_rotors()
 
     def _at(self, q: npt.ArrayLike) -> Array:
-        """Returns q as numbers; warns of what is many turns and fits in degrees."""
+        """Returns q as numbers; warns of many turns that would fit as degrees."""
         values = _joint_values("q", q)
         if values.shape == (len(self),) and np.abs(values).max() > 13:
             complaint = self._core.outside_limits(values)
@@ -285,9 +284,9 @@ class Robot:
 
 
 def published_drives() -> dict[str, dict[str, Any]]:
-    """Returns public figures of arms' drives by name: `reflected_inertia` (n, kg m^2),
+    """Returns public values of arms' drives by name: `reflected_inertia` (n, kg m^2),
     `viscous_friction` (n, N m s/rad) and `coulomb_friction` (n, N m; zeros: not published), with
-    `source` and `doubt`. None was measured on the arm at hand."""
+    `source` and `doubt`. They were not measured on your arm."""
     return _core.published_drives()
 
 
@@ -320,16 +319,16 @@ def check_postures(robot: Robot, name: str, postures: Iterable[Array]) -> None:
 
 def one_damping(part: str, stiffness: npt.ArrayLike | None, damping: npt.ArrayLike | None,
                 ratio: float) -> None:
-    """Raises Error for springs without damping, of which a matrix or a ratio is wanted."""
+    """Raises Error for springs without a damping matrix or ratio."""
     if stiffness is not None and np.any(stiffness) and damping is None and not ratio:
         raise Error(f"{part}_damping and {part}_damping_ratio: one of them is wanted beside "
                     f"{part}_stiffness; {part}_damping = zeros is a loop without damping")
 
 
 def is_kinematic(null_projector: str) -> bool:
-    """Returns whether this projector of the null space is the pseudo-inverse's."""
+    """Returns whether null_projector is the projector of the pseudo-inverse."""
     if null_projector not in ("dynamic", "kinematic"):
-        raise Error(f"null_projector: {null_projector!r} is none of dynamic, kinematic")
+        raise Error(f"null_projector: {null_projector!r} is not one of dynamic, kinematic")
     return null_projector == "kinematic"
 
 
@@ -337,20 +336,20 @@ def selected(directions: Sequence[str]) -> list[bool]:
     """Returns which of the six directions are named."""
     for direction in directions:
         if direction not in DIRECTIONS:
-            raise Error(f"directions: '{direction}' is none of {', '.join(DIRECTIONS)}")
+            raise Error(f"directions: '{direction}' is not one of {', '.join(DIRECTIONS)}")
     return [direction in directions for direction in DIRECTIONS]
 
 
 def is_tool(frame: str) -> bool:
     """Returns whether the frame of gains is the tool's."""
     if frame not in ("base", "tool"):
-        raise Error(f"frame: '{frame}' is none of base, tool")
+        raise Error(f"frame: '{frame}' is not one of base, tool")
     return frame == "tool"
 
 
 def gains_text(**given: Any) -> str:
-    """Returns gains as a configuration has them: task_damping is gains.task.damping. What is None, or
-    a ratio of 0, is missing."""
+    """Returns gains as a configuration has them: task_damping is gains.task.damping. None, or a ratio
+    of 0, counts as missing."""
     gains: dict[str, dict[str, Any]] = {"joint": {}, "task": {}, "null_space": {}}
     for key, value in given.items():
         part, _, name = key.partition("_")
@@ -365,22 +364,22 @@ def gains_text(**given: Any) -> str:
 def is_cartesian(mode: str) -> bool:
     """Returns whether springs are fixed to a pose of the tip."""
     if mode not in ("joint", "cartesian"):
-        raise Error(f"mode: '{mode}' is none of joint, cartesian")
+        raise Error(f"mode: '{mode}' is not one of joint, cartesian")
     return mode == "cartesian"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ClosedLoop(Result):
     """The robot with springs and dampers, M q'' + C q' + K q = f, where its springs are at rest. With
-    gears that bend n counts their motors as well, after the joints."""
+    elastic gears n counts their motors as well, after the joints."""
 
     mass: Array
     """M, n x n, kg m^2."""
     damping: Array
     """C, n x n, N m s/rad, the joints' viscous friction included."""
     stiffness: Array
-    """K, n x n, N m/rad; not symmetric with an external wrench, or where gears bend and links are
-    measured."""
+    """K, n x n, N m/rad; not symmetric with an external wrench, or with elastic gears and measured
+    links."""
     modes: Modes
 
 
@@ -398,19 +397,19 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     Matrices are symmetric positive semidefinite, and may be given as their diagonals. With
     `joint_stiffness` or `joint_damping` (n x n) springs are fixed to a joint position, otherwise to
     a pose of the tip, with `task_stiffness` K_C and `task_damping` C_C (6 x 6, in the axes of
-    `frame`, base or tool). In the motions that the selected `directions` leave free act
-    `null_stiffness` and `null_damping` (n each), through the dynamically consistent projector or,
-    with a `null_projector` of "kinematic", the projector of the pseudo-inverse. A damping ratio
-    above 0 has the damping designed for it; the robot's viscous friction comes on top, and moves
+    `frame`, base or tool). `null_stiffness` and `null_damping` (n each) act in the motions that the
+    selected `directions` leave free, through the dynamically consistent projector or,
+    with a `null_projector` of "kinematic", the projector of the pseudo-inverse. If a damping ratio
+    is above 0, the damping is designed for it; the robot's viscous friction is added, and changes
     the ratios. The springs hold an `external_wrench` (6, of the world on the tip, in the base's
     axes) at q; `load` says how it moves with the arm, which adds stiffness: base_wrench,
     tool_wrench (it turns with the tip), joint_torques (its joint torques are constant).
 
     Raises Error for a posture outside the position limits, gains that the controller would refuse,
-    and springs with no damping or two.
+    and springs without damping, or with both a matrix and a ratio.
     """
     if load not in LOADS:
-        raise Error(f"load: {load!r} is none of {', '.join(LOADS)}")
+        raise Error(f"load: {load!r} is not one of {', '.join(LOADS)}")
     kinematic = is_kinematic(null_projector)
     kind = 0 if external_wrench is None else 1 + LOADS.index(load)
     at_tip = joint_stiffness is None and joint_damping is None and joint_damping_ratio == 0

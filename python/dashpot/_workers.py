@@ -66,9 +66,9 @@ def chunks_of(samples: int) -> Iterator[tuple[int, int]]:
 
 def collect(executor: concurrent.futures.Executor,
             chunks: list[tuple[Callable[..., Any], tuple[Any, ...]]], samples: int) -> list[Any]:
-    """Returns what the functions return, in their order, whoever calls them and when.
+    """Returns the results of the functions, in their order.
 
-    Raises BrokenExecutor, saying what was done, if workers die.
+    Raises BrokenExecutor, with the number of finished postures, if workers die.
     """
     futures: list[Any] = []
     try:

@@ -1,7 +1,7 @@
 """Drives a Franka Research 3 through libfranka: python -m dashpot.franka CONFIG --robot ADDRESS.
 
-It needs the package pylibfranka, which has the maker's library inside. docs/franka.md says how to
-begin. `Session` does the same for a program of one's own.
+It needs the package pylibfranka, which contains the maker's library. docs/franka.md says how to
+begin. `Session` does the same for your own program.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Session:
     def __init__(self, config: str | os.PathLike[str] | Mapping[str, Any], robot: str, *,
                  dry_run: bool = False, urls: Sequence[str] = (), publish: bool = True) -> None:
         """Reads the configuration, a path or a dict. `urls` are the buses and logs to publish on.
-        Raises Error that names what does not fit the robot's loop."""
+        Raises Error for a configuration that does not fit the robot's loop."""
         self.controller = Controller(config)
         self.robot = robot
         self.dry_run = dry_run
@@ -50,7 +50,7 @@ class Session:
         self.answers = Answers()
         self.statuses = [0] * len(Status)
         self.faults = 0
-        self.fault = Status.OK  # that has latched; OK: none
+        self.fault = Status.OK  # latched; OK: none
         self.states = self.lost = self.sent = self.waited = 0
         self.period = 0.0
         self.tip_distance = 0.0  # m, from the configuration's tip to the robot's end effector
@@ -60,15 +60,15 @@ class Session:
                               max(FADE, float(np.max(loop["torque"] / loop["torque_rate"]))))
         self._urls = tuple(urls)
         self._publish = publish
-        self._goal: Any = None  # parts of the set-point in force
-        self._news = False  # of it
+        self._goal: Any = None  # parts of the active set-point
+        self._news = False  # the set-point is new
         self._stop: str | None = None
         self._now = False
         self._lock = threading.Lock()
 
     def set_setpoint(self, setpoint: Setpoint | None = None, **parts: Any) -> None:
-        """Sets where the arm is to go: a Setpoint, or what makes one. It stays in force until the
-        next one, or a fault. Raises Error for one that is not possible."""
+        """Sets where the arm has to go: a Setpoint, or its parts. It stays active until the next one,
+        or a fault. Raises Error for an impossible one."""
         wanted = Setpoint(**parts) if setpoint is None else setpoint
         goal = wanted._parts()[:4]
         self.controller._core.check_setpoint(*goal)
@@ -76,13 +76,13 @@ class Session:
             self._goal, self._news = goal, True
 
     def stop(self, why: str = "ended by the user", *, at_once: bool = False) -> None:
-        """Ends the loop: the arm stops and the torque fades first, unless it is to end at once."""
+        """Ends the loop: the arm stops and the torque fades first, unless `at_once` is true."""
         self._now = self._now or at_once
         self._stop = self._stop or why
 
     def run(self, duration: float | None = None) -> dict[str, Any]:
         """Drives the robot until `stop`, or for `duration` seconds. Returns the report; its key
-        `failure` says why the robot, or what was found of it, ended the loop: None if nothing did."""
+        `failure` is the reason if the robot or its state ended the loop, otherwise None."""
         franka = importlib.import_module("pylibfranka")
         before = open_files()
         failure = None
@@ -115,7 +115,7 @@ class Session:
         return robot.read_once() if control is None else control.readOnce()[0]
 
     def _watch(self, robot: Any, wire: Wire) -> None:
-        """Looks at states for a while, and raises Error or RobotStopped unless all is in order."""
+        """Watches states for a while; raises Error or RobotStopped if something is wrong."""
         times: list[float] = []
         silent = time.monotonic()
         while not times or times[-1] - times[0] < WATCH:
@@ -132,7 +132,7 @@ class Session:
             raise Error(f"control.period: is {1e3 * self.controller.period:g} ms, but states come "
                         f"every {1e3 * self.period:g} ms")
         if not np.isfinite([state.q, state.dq]).all():
-            raise RobotStopped("the robot's positions or velocities are no numbers")
+            raise RobotStopped("the robot's positions or velocities are not finite")
         mode = state.robot_mode.name
         if not self.dry_run and mode != "Idle":
             raise RobotStopped(f"the robot is not ready (mode {mode}): " +
@@ -146,7 +146,7 @@ class Session:
                   file=sys.stderr, flush=True)
 
     def _converse(self, franka: Any, robot: Any, wire: Wire, duration: float | None) -> str:
-        """Answers states until it is to end. Returns why it ended."""
+        """Answers states until the end. Returns why it ended."""
         control = None if self.dry_run else robot.start_torque_control()
         torques = franka.Torques([0.0] * 7)
         update = self.controller._core.update
@@ -219,7 +219,7 @@ class Session:
             self.least_success_rate = rate
 
     def _setpoint(self, ns: int) -> Any:
-        """The set-point for the tick at `ns`, as the core takes it; None keeps the one in force."""
+        """The set-point for the tick at `ns`, as the core takes it; None keeps the active one."""
         if self._stop or not self._news and (self._goal is None or self.states % REPEAT):
             return None
         with self._lock:
@@ -234,17 +234,17 @@ class Session:
             self.faults += 1
             with self._lock:
                 self._goal, self._news = None, False
-        if status > self.fault:  # the worst is told, not what came first
+        if status > self.fault:  # the worst is reported, not the first
             self.fault = Status(status)
             if not self.dry_run:
                 print(f"dashpot.franka: a fault, the arm is damped: {self.fault.text}",
                       file=sys.stderr, flush=True)
-        if self.dry_run:  # somebody else moves the arm as he likes: that is no fault of this loop
+        if self.dry_run:  # another program or person moves the arm: not a fault of this loop
             self.controller.release()
 
     def _report(self, ended: str, failure: str | None) -> dict[str, Any]:
         snapshot = self.controller.snapshot() if self.running else None
-        # At the last posture, with the springs: those of the last tick are the brake's.
+        # At the last posture, with the springs: the modes of the last tick belong to the brake.
         found = None if snapshot is None else self.controller.modes_at(snapshot.position)
         return {
             "driver": "libfranka", "robot": self.robot, "dry_run": self.dry_run,
@@ -303,7 +303,7 @@ def _seconds(text: str) -> float:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The program. Returns its exit status: 2 for input that is refused, 1 for a robot that stops."""
+    """The program. Returns its exit status: 2 for refused input, 1 if the robot stops."""
     parser = argparse.ArgumentParser(
         prog="python -m dashpot.franka", description=str(__doc__).split(":")[0] + ".",
         epilog="Read docs/franka.md first; begin with --dry-run. Ctrl-C ends it: the arm stops and the "
@@ -312,8 +312,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--robot", metavar="ADDRESS", required=True, help="of the robot")
     parser.add_argument("--dry-run", action="store_true",
                         help="computes and publishes everything, and commands nothing")
-    parser.add_argument("--lcm-url", metavar="URL", default="", help="bus; otherwise that of "
-                        "LCM_DEFAULT_URL, or multicast within this machine")
+    parser.add_argument("--lcm-url", metavar="URL", default="", help="bus (default: "
+                        "LCM_DEFAULT_URL, or multicast within this machine)")
     parser.add_argument("--log", metavar="FILE", help="LCM log to write")
     parser.add_argument("--duration", metavar="S", type=_seconds, help="ends after this time")
     parser.add_argument("--json", action="store_true", help="ends with JSON instead of a table")

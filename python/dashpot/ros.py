@@ -1,4 +1,4 @@
-"""Shows in ROS 2 what gains do where an arm stands: python -m dashpot.ros CONFIG.
+"""Shows in ROS 2 what gains do at an arm's posture: python -m dashpot.ros CONFIG.
 
 It needs rclpy and messages, from a distribution or from PyPI. docs/ros.md has topics and parameters.
 """
@@ -22,7 +22,7 @@ from ._core import Error
 GAINS = ("joint_stiffness", "joint_damping", "joint_damping_ratio", "task_stiffness",
          "task_damping", "task_damping_ratio", "null_stiffness", "null_damping",
          "null_damping_ratio")
-RINGS = 0.2  # ratio of damping below which a mode counts as one that rings
+RINGS = 0.2  # damping ratio below which a mode rings
 ARROW = 0.3  # m, of the marker
 WATCHED = 50  # states before the torque begins
 PERIOD_TOLERANCE = 0.2  # of the period
@@ -30,10 +30,10 @@ FADE = 0.2  # s from a stop to no torque
 
 
 class ModesNode:
-    """The node `dashpot`: listens to joint states, and publishes the modes at the last of them."""
+    """The node `dashpot`: listens to joint states, and publishes the modes at the latest one."""
 
     def __init__(self, node: Any, config: str, torque_topic: str | None, dry_run: bool) -> None:
-        """Raises Error for a configuration that is refused."""
+        """Raises Error for a refused configuration."""
         messages = {name: importlib.import_module(f"{name}.msg") for name in (
             "std_msgs", "sensor_msgs", "diagnostic_msgs", "visualization_msgs", "geometry_msgs")}
         self.node = node
@@ -76,7 +76,7 @@ class ModesNode:
         node.create_timer(1 / float(node.get_parameter("rate").value), self._analyze)
 
     def gains(self, changes: Any = ()) -> dict[str, Any]:
-        """Returns the gains that parameters set, with `changes` of them."""
+        """Returns the gains set by the parameters and their `changes`."""
         values = {name: self.node.get_parameter(name).value for name in GAINS}
         values.update({one.name: one.value for one in changes if one.name in GAINS})
         found: dict[str, Any] = {}
@@ -116,7 +116,7 @@ class ModesNode:
         return str(self.node.get_parameter("mode").value)
 
     def _take(self, state: Any) -> None:
-        """Takes a JointState, whose joints may be more, and in any order."""
+        """Takes a JointState, which may have more joints, in any order."""
         names = tuple(state.name)
         if names != self._order[0]:
             missing = [name for name in self.names if name not in names]
@@ -167,14 +167,14 @@ class ModesNode:
         torque, status = self.controller.update(time, self._q, velocity)
         self.statuses[status] += 1
         if self.dry_run:
-            if status >= Status.FAULT_LATCHED:  # somebody else moves the arm as he likes
+            if status >= Status.FAULT_LATCHED:  # another program or person moves the arm
                 self.controller.release()
             self.ended = self.ended or self._stop
             return
         left = self._ending.left(time, self._q) if self._stop else 1.0
         if self.controller.needs_brakes() and not (
                 status >= Status.STATE_NOT_FINITE and torque.any()):  # the last weight, for 2 s
-            # A topic has no brakes: nothing pulls any more.
+            # A topic has no brakes: the torque ends.
             self._fail(f"{status.text}: the last torque was zero")
             left = 0.0
         torque = left * torque
@@ -184,7 +184,7 @@ class ModesNode:
         self.torques += 1
 
     def _analyze(self) -> None:
-        """Publishes what is found at the last state."""
+        """Publishes modes, margin and diagnostics at the latest state."""
         if self._q is None:
             return
         gains, mode = self.gains(), self._mode()
@@ -209,7 +209,7 @@ class ModesNode:
         elif margin < enough:
             verdicts = [self._status("gains", 1, "little gain margin", found)]
         else:
-            verdicts = [self._status("gains", 0, "the sampled loop bears them", found)]
+            verdicts = [self._status("gains", 0, "the sampled loop keeps its margin", found)]
         rotors = str(self.loop["missing_rotors"])
         if rotors:
             verdicts.append(self._status("rotors", 1, f"the model has no rotors: {rotors}", {}))
@@ -236,7 +236,7 @@ class ModesNode:
         self._diagnostics.publish(array)
 
     def _mark(self, modes: Any, jacobian: Any, place: Any) -> None:
-        """An arrow at the tip: which way, and how far of all joints' motion, the mode moves it."""
+        """An arrow at the tip in the direction in which the mode moves it."""
         index = int(self.node.get_parameter("shape").value) - 1
         if index >= len(modes):
             return
@@ -273,8 +273,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "-p shape:=2")
     parser.add_argument("config", metavar="CONFIG", help="configuration file of the controller")
     parser.add_argument("--torque-topic", metavar="T",
-                        help="commands efforts there (std_msgs/Float64MultiArray), of a simulator")
-    parser.add_argument("--dry-run", action="store_true", help="computes them, and commands nothing")
+                        help="commands the efforts of a simulator there (std_msgs/Float64MultiArray)")
+    parser.add_argument("--dry-run", action="store_true", help="computes efforts, and commands nothing")
     given = list(sys.argv[1:] if arguments is None else arguments)
     begin = given.index("--ros-args") if "--ros-args" in given else len(given)
     options = parser.parse_args(given[:begin])

@@ -1,6 +1,6 @@
 """Dashpot controls an arm that MuJoCo simulates: mujoco_loop.py CONFIG URDF
 
-The arm is pushed at its tip for a tenth of a second, and swings with the modes that Dashpot tells.
+The arm is pushed at its tip for a tenth of a second, and swings with the modes that Dashpot prints.
 """
 import sys
 

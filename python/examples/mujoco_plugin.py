@@ -1,4 +1,4 @@
-"""An arm of any MJCF model under the engine plugin: it is held, and tells its modes.
+"""An arm of any MJCF model under the engine plugin: it is held, and its modes are printed.
 
 python python/examples/mujoco_plugin.py ARM.xml CONFIG.yaml [LIBRARY]
 """
@@ -15,7 +15,7 @@ def scene(arm, config):
     """The model in the file `arm` with the plugin, and without its own actuators."""
     spec = mujoco.MjSpec.from_file(arm)
     folder = pathlib.Path(arm).resolve().parent
-    if not (folder / spec.meshdir).exists():  # that of the program that the file was taken from
+    if not (folder / spec.meshdir).exists():  # a path of the program that the file was taken from
         spec.meshdir = str(folder / "meshes")
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
     spec.activate_plugin("dashpot.impedance")

@@ -1,7 +1,7 @@
 """Fig. 1 of Kao and Saldarriaga (ROBOMECH Journal 8:12, 2021): release.py PANDA_URDF [PICTURE]
 
 A Panda is displaced by 2 cm along y and let go, with the two damping matrices of the paper and with
-ratio damping. Draws a picture where matplotlib is installed.
+ratio damping. Draws a picture if matplotlib is installed.
 """
 import sys
 

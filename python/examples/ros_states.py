@@ -1,4 +1,4 @@
-"""A Panda on /joint_states that stretches, and what python -m dashpot.ros says of it.
+"""A Panda on /joint_states that stretches, and the ratios from python -m dashpot.ros.
 
 python python/examples/ros_states.py, beside python -m dashpot.ros controller/examples/panda.yaml
 """

@@ -8,7 +8,7 @@ namespace dashpot::python {
 
 /// Returns the entries of dashpot.Modes.
 nb::dict modes_of(const analysis::Spectrum<>& spectrum);
-/// Returns the entries of dashpot.SampledModes but for the gain margin and the continuous modes.
+/// Returns the entries of dashpot.SampledModes without gain margin and continuous modes.
 nb::dict sampled_modes_of(const analysis::SampledSpectrum& sampled);
 
 /// Returns the structure of a name; throws std::invalid_argument for another name.

@@ -90,7 +90,7 @@ Table sample(const RobotAudit& all, std::uint64_t seed, std::int64_t first, std:
   return to_table(all.audit.sample(seed, first, count));
 }
 
-/// The numbers of postures that are given by rows.
+/// The numbers of postures given by rows.
 Table numbers_at(const RobotAudit& all, const Eigen::MatrixXd& postures) {
   std::vector<PostureNumbers> numbers;
   for (Eigen::Index i = 0; i < postures.rows(); ++i) {
@@ -215,18 +215,19 @@ nb::dict contact(const RobotAudit& all, const Eigen::VectorXd& q,
   return result;
 }
 
-/// Postures first .. first + count - 1 of a sequence, or of those given by rows.
+/// Postures first .. first + count - 1 of a sequence, or of postures given by rows.
 JointVector posture_of(const RobotAudit& all, std::uint64_t seed, const OptionalMatrix& postures,
                        std::int64_t index) {
   if (!postures) return all.audit.posture(seed, index);
   return all.robot.joint_vector("postures", postures->row(index));
 }
 
-/// A question that other processes are asked: damping, ratio wanted, level, ceiling, largest gain
-/// margin that is sought, members.
+/// A question to other processes: damping, wanted ratio, level, ceiling, largest gain margin of
+/// interest, members.
 using Question =
     std::tuple<Eigen::MatrixXd, double, double, double, double, std::vector<std::size_t>>;
-/// Their answer: level, largest ratio, worst sample, smallest gain margin, where, those that bind.
+/// Their answer: level, largest ratio, worst sample, smallest gain margin, its sample, samples that
+/// limit the result.
 using Verdict = std::tuple<double, double, std::int64_t, double, std::int64_t,
                            std::vector<std::pair<double, std::size_t>>>;
 
@@ -236,8 +237,8 @@ analysis::DampingTarget target_of(const RobotAudit& all, double ratio) {
   return target;
 }
 
-/// Judges `count` postures, the first of which is number `first` of the region. With `postures` by
-/// rows these are just the rows that are judged.
+/// Judges `count` postures of the region from number `first` on. `postures`, by rows, has only the
+/// judged rows.
 Verdict judge(const RobotAudit& all, const Question& asked, std::uint64_t seed, std::int64_t first,
               std::int64_t count, const OptionalMatrix& postures) {
   const auto q = [&](std::int64_t number) {

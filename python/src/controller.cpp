@@ -16,8 +16,8 @@
 namespace dashpot::python {
 namespace {
 
-/// A controller. Calls that take long run without the interpreter's lock; these mutexes keep such
-/// calls of several threads apart, as plugin.h asks for. The remaining calls hold the lock.
+/// A controller. Long calls run without the interpreter's lock; these mutexes serialise them
+/// between threads, as plugin.h requires. The remaining calls hold the lock.
 class Host {
  public:
   explicit Host(dashpot_controller* controller) : controller_(controller) {}
@@ -32,7 +32,7 @@ class Host {
     if (!publisher_) throw std::invalid_argument(dashpot_publisher_error());
   }
   void stop_publishing() { publisher_.reset(); }
-  /// For reading results: a publisher is the only one that may.
+  /// For reading results: while there is a publisher, only it may read them.
   dashpot_controller* readable() const {
     if (publisher_) throw std::invalid_argument("publish: results are read by the publisher");
     return get();
@@ -85,7 +85,7 @@ class Numbers {
   std::vector<std::vector<double>> kept_;
 };
 
-/// A set-point of the C interface, with what it points to.
+/// A set-point of the C interface, with the data that it points to.
 class SetpointData {
  public:
   SetpointData(const Host& host, bool cartesian, const OptionalMatrix& joint_position,
@@ -114,7 +114,7 @@ class SetpointData {
 using OptionalSetpoint = std::optional<
     std::tuple<bool, OptionalMatrix, OptionalMatrix, OptionalMatrix, std::optional<std::int64_t>>>;
 
-/// Gains of the C interface, with what they point to.
+/// Gains of the C interface, with the data that they point to.
 class GainsData {
  public:
   GainsData(const Host& host, const nb::dict& keys) : n_(static_cast<Eigen::Index>(host.joints())) {
@@ -165,7 +165,7 @@ nb::tuple update(Host& host, std::int64_t time, const Eigen::VectorXd& q, const 
   if (wrench && wrench->size() != 6) {
     throw std::invalid_argument("external_wrench: six numbers are wanted");
   }
-  const bool fits = q.size() == qd.size();  // an arm that stops for it is safer than an exception
+  const bool fits = q.size() == qd.size();  // stopping the arm is safer than an exception
   const dashpot_state state{sizeof state, static_cast<std::uint32_t>(fits ? q.size() : 0),
                             time,         q.data(),
                             qd.data(),    wrench ? wrench->data() : nullptr};
@@ -185,7 +185,7 @@ nb::tuple update(Host& host, std::int64_t time, const Eigen::VectorXd& q, const 
   return nb::make_tuple(torque, status);
 }
 
-/// Returns what to be warned of; "" if nothing.
+/// Returns the warning, or "".
 std::string start(Host& host, const Eigen::MatrixXd& q, const OptionalMatrix& torque) {
   const auto n = static_cast<Eigen::Index>(host.joints());
   Numbers numbers;
@@ -209,7 +209,7 @@ void reset(Host& host, const OptionalMatrix& torque) {
   }
 }
 
-/// Raises for a set-point that is not possible.
+/// Raises for an impossible set-point.
 void check_setpoint(const Host& host, bool cartesian, const OptionalMatrix& joint_position,
                     const OptionalMatrix& tip_pose, const OptionalMatrix& wrench) {
   const SetpointData setpoint(host, cartesian, joint_position, tip_pose, wrench, 0);
@@ -242,7 +242,7 @@ void set_setpoint(Host& host, bool cartesian, const OptionalMatrix& joint_positi
   check(dashpot_set_setpoint(host.get(), &setpoint.given));
 }
 
-/// Returns what to be warned of, as set_payload does; "" if nothing.
+/// Returns the warning, or "", as set_payload does.
 std::string set_gains(Host& host, const nb::dict& keys) {
   const GainsData gains(host, keys);
   const nb::gil_scoped_release release;
@@ -263,7 +263,7 @@ double judge_gains(Host& host, const OptionalMatrix& position, const nb::dict& k
   return margin;
 }
 
-/// The modes at rest at a posture, where no loop has to run; the tip's Jacobian and place there.
+/// The modes at rest at a posture, without a running loop; the tip's Jacobian and place there.
 nb::tuple modes_at(Host& host, const Eigen::VectorXd& position, bool cartesian,
                    const nb::dict& keys) {
   analysis::check_size("q", position, static_cast<Eigen::Index>(host.joints()), 1);
@@ -321,7 +321,7 @@ void release(Host& host) {
   check(dashpot_release(host.get()));
 }
 
-/// What a host of a robot compares with the robot.
+/// Data that a host compares with the robot.
 nb::dict loop_of(const Host& host) {
   const controller::Settings& settings = host.get()->settings;
   const controller::Analysis::Sampled& sampled = settings.analysis.sampled;

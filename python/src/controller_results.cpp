@@ -1,4 +1,4 @@
-// What a controller found, as dicts.
+// Results of a controller, as dicts.
 
 #include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/controller/posture_loop.hpp>
@@ -37,7 +37,7 @@ nb::dict columns(const std::vector<Item>& modes) {
   return result;
 }
 
-/// Reads one of the three results; nothing if there is none yet.
+/// Reads one of the three results; empty before the first.
 template <class Struct, class Read>
 bool read_result(dashpot_controller* controller, Read read, Struct& found) {
   found.struct_size = sizeof found;

@@ -4,7 +4,7 @@
 
 namespace dashpot::python {
 
-/// Each returns the latest result as a dict, or None as long as there is none.
+/// Each returns the latest result as a dict, or None before the first.
 nb::object snapshot_of(dashpot_controller* controller);
 nb::object modes_of(dashpot_controller* controller);
 nb::object sampled_modes_of(dashpot_controller* controller);

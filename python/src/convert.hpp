@@ -1,5 +1,5 @@
 #pragma once
-// What all sources of the module share: conversions between C++ and numpy.
+// Conversions between C++ and numpy.
 
 #include <dashpot/analysis/task_space.hpp>
 

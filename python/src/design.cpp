@@ -1,4 +1,4 @@
-// Damping for the ratios wanted.
+// Damping for wanted ratios.
 
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/python/src/analysis.hpp>
@@ -11,7 +11,7 @@ analysis::DampingStructure structure_of(const std::string& name) {
   if (name == "full") return analysis::DampingStructure::kFull;
   if (name == "block") return analysis::DampingStructure::kBlock;
   if (name == "diagonal") return analysis::DampingStructure::kDiagonal;
-  throw std::invalid_argument("structure: '" + name + "' is none of full, block and diagonal");
+  throw std::invalid_argument("structure: '" + name + "' is not one of full, block, diagonal");
 }
 
 namespace {
@@ -33,7 +33,7 @@ nb::dict entries_of(const DampingDesign& design) {
   return result;
 }
 
-/// Designs with the closed form where that is what is asked for.
+/// Designs with the closed form if the request allows it.
 DampingDesign design_continuous(const analysis::TaskImpedance& impedance,
                                 const DampingTarget& target, DampingStructure structure,
                                 const OptionalMatrix& start) {

@@ -32,7 +32,7 @@ nb::dict measured_modes_of(const std::vector<MeasuredMode>& modes) {
   return result;
 }
 
-/// The kind of a record by its motion alone, in which modes can be looked for.
+/// The kind of a record, by its motion alone.
 MotionKind kind_of(const MotionRecord& record) {
   const identification::MotionVerdict verdict = judge_motion(record);
   if (verdict.kind == MotionKind::kNothing) {
@@ -52,7 +52,7 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
                   const std::vector<Eigen::MatrixXd>& inputs, bool find, bool ambient,
                   int max_order) {
   std::vector<MotionRecord> records;
-  std::vector<std::array<double, 3>> parts;  // number of the record, begin and end
+  std::vector<std::array<double, 3>> parts;  // number of the record, beginning and end
   const bool excited = !inputs.empty() && inputs.front().rows() > 0;
   MotionKind kind = ambient   ? MotionKind::kAmbient
                     : excited ? MotionKind::kDriven
@@ -66,7 +66,7 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
       identification::check_records({record});
       if (judged) {
         const MotionKind its = kind_of(record);
-        if (r > 0 && its != kind) continue;  // `parts` tells
+        if (r > 0 && its != kind) continue;  // `parts` shows it
         kind = its;
       }
       std::vector<FreeDecay> pieces{{0, record.time.size(), {}}};

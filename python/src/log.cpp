@@ -68,7 +68,7 @@ class Columns {
  public:
   explicit Columns(const std::vector<Message>& messages) : messages_(messages) {}
 
-  /// Adds a field. Where sizes differ, what is missing is NaN, or -1 in arrays of integers.
+  /// Adds a field. If sizes differ, missing entries are NaN, or -1 in arrays of integers.
   template <class Field>
   void operator()(const char* name, Field Message::*field) {
     constexpr bool kReal = std::is_floating_point_v<typename NestedNumbers<Field>::Type>;
@@ -151,8 +151,8 @@ nb::dict entries_of(const std::string& name, const Channel& channel) {
   return result;
 }
 
-/// Returns the channels, the numbers of messages that could not be decoded, and what is wrong with
-/// the log ("" if nothing is).
+/// Returns the channels, the numbers of messages that could not be decoded, and the log's damage
+/// ("" if it is intact).
 nb::tuple read_log(const std::string& path) {
   std::map<std::string, Channel> channels;
   std::string damage;

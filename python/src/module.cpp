@@ -8,7 +8,7 @@
 namespace dashpot::python {
 namespace {
 
-/// Everything that Dashpot refuses becomes dashpot.Error.
+/// Refused input becomes dashpot.Error.
 void translate(const std::exception_ptr& thrown, void* error_type) {
   const auto raise = [&](const std::exception& error) {
     PyErr_SetString(static_cast<PyObject*>(error_type), error.what());
@@ -29,7 +29,7 @@ void translate(const std::exception_ptr& thrown, void* error_type) {
 
 NB_MODULE(_core, m) {
   using namespace dashpot::python;  // NOLINT(google-build-using-namespace): a macro's function
-  nb::set_leak_warnings(false);     // what other packages keep until the end is no leak of ours
+  nb::set_leak_warnings(false);     // other packages may keep our objects until the end
   PyObject* const error = PyErr_NewException("dashpot.Error", PyExc_ValueError, nullptr);
   if (error == nullptr) nb::raise_python_error();
   m.attr("Error") = nb::steal(error);

@@ -64,7 +64,7 @@ analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, cons
   Settings settings = controller::default_settings(robot.model);
   settings.task_terms.load = load;
   if (kinematic) settings.null_projector = controller::NullProjector::kKinematic;
-  settings.limits.gain_margin = 1;  // no loop is told that could lower a ratio
+  settings.limits.gain_margin = 1;  // no loop is given for which a ratio could be lowered
   return controller::PostureLoop(robot.model, settings)
       .at(q, gains, mode, wrench.value_or(Eigen::VectorXd(Eigen::VectorXd::Zero(6))))
       .system;
@@ -95,14 +95,14 @@ nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& 
   return result;
 }
 
-/// The robot of a URDF's text that stands under the key `robot` of another, as in a configuration.
+/// The robot of a URDF's text, with the key `robot` of another text, as in a configuration.
 Robot make_robot(const std::string& urdf, const std::string& text) {
   static constexpr std::array<std::string_view, 1> kKeys = {"robot"};
   const text::YamlNode document = text::parse_made_yaml(text);
   return Robot(controller::read_robot({document, "", kKeys}, "", urdf).model());
 }
 
-/// The gains that stand under the key `gains` of a text, as in a configuration.
+/// The gains under the key `gains` of a text, as in a configuration.
 Gains make_gains(const Robot& robot, const std::string& text) {
   static constexpr std::array<std::string_view, 1> kKeys = {"gains"};
   const text::YamlNode document = text::parse_made_yaml(text);

@@ -18,7 +18,7 @@ def root():
 
 @pytest.fixture(scope="session")
 def program():
-    """The program dashpot, which tells the same numbers; skips where it was not built."""
+    """The program dashpot, which prints the same numbers; skips if it was not built."""
     path = pathlib.Path(os.environ.get("DASHPOT_PROGRAM", ROOT / "build/release/dashpot"))
     if not path.exists():
         pytest.skip("the program was not built (./run build)")

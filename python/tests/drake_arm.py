@@ -48,7 +48,7 @@ class DrakeArm:
         inlet = builder.AddSystem(LcmSubscriberSystem.Make(
             f"{kind.upper()}_COMMAND", command, self.lcm, use_cpp_serializer=True))
         self.outlet = builder.AddSystem(LcmPublisherSystem.Make(
-            f"{kind.upper()}_STATUS", status, self.lcm, publish_period=1e6,  # when told
+            f"{kind.upper()}_STATUS", status, self.lcm, publish_period=1e6,  # on request
             use_cpp_serializer=True))
         # The simulator takes a message up in the period after the one in which it came.
         gain = PERIOD / (PERIOD + 1 / (2 * math.pi * cutoff)) if cutoff else 1.0  # as libfranka

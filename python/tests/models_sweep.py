@@ -1,5 +1,5 @@
 """Every arm of the models in robosuite, franky-sim and example-robot-data (PyPI): read, or refused
-with the reason, with its numbers beside those of MuJoCo and Pinocchio.
+with the reason, with its numbers beside the numbers of MuJoCo and Pinocchio.
 
     python python/tests/models_sweep.py
 

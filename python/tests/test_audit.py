@@ -45,9 +45,9 @@ def test_doubtful_gains_are_asked_about(panda, gains, question):
 
 @pytest.mark.parametrize("options, complaint", [
     (dict(period=1), "period: must be between 0 and 0.1 s; is it in ms"),
-    (dict(period=0.001, delay=0.002), "delay: 0.002 is no whole number of ticks; is it in s"),
-    (dict(period=0.001, delay=np.inf), "delay: inf is no whole"),
-    (dict(period=0.001, delay=np.nan), "delay: nan is no whole"),
+    (dict(period=0.001, delay=0.002), "delay: 0.002 is not a whole number of ticks; is it in s"),
+    (dict(period=0.001, delay=np.inf), "delay: inf is not a whole"),
+    (dict(period=0.001, delay=np.nan), "delay: nan is not a whole"),
     (dict(samples=9, lower=[-100] * 7, upper=[100] * 7), "lower and upper.0.: joint 'panda_joint1' at")])
 def test_other_units_are_refused(panda, options, complaint):
     with pytest.raises(dashpot.Error, match=complaint):
@@ -205,7 +205,7 @@ def test_unknown_rotors_are_said_to_be_so_with_what_would_be_enough(root, panda)
     np.testing.assert_allclose(
         np.sort(posture.damping_ratios_with_rotors), np.sort(found.modes.damping_ratio), rtol=1e-9
     )
-    with pytest.raises(dashpot.Error, match="drives: 'pandas' is none of panda, fr3"):
+    with pytest.raises(dashpot.Error, match="drives: 'pandas' is not one of panda, fr3"):
         dashpot.Robot.from_urdf(*model, drives="pandas")
 
 

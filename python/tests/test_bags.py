@@ -99,7 +99,7 @@ def test_postures_of_a_topic_are_those_of_the_joints_by_name(panda):
     assert np.array_equal(found.worst_q, given.worst_q)
     joints["position"][2, list(order).index(4)] = np.nan
     assert dashpot.audit(panda, postures=joints, **gains).workspace.samples == 5
-    joints["name"][0] = "nobody"
+    joints["name"][0] = "other_joint"
     with pytest.raises(dashpot.Error, match=f"no positions of {names[order[0]]}"):
         dashpot.audit(panda, postures=joints, **gains)
 

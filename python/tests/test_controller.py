@@ -175,7 +175,7 @@ def test_what_is_not_possible_is_refused_or_gives_a_status(config):
 
 def test_gains_that_are_taken_though_their_margin_is_small_are_warned_of(config):
     controller = dashpot.Controller(config)
-    folded = [0, -0.2, 0, -2.9, 0, 2.9, 0.785]  # where less is borne
+    folded = [0, -0.2, 0, -2.9, 0, 2.9, 0.785]  # where the achievable ratio is lower
 
     def gains(damping):
         return dict(joint_stiffness=[300] * 7, joint_damping=[damping, 1, 1, 1, 1, 1, 1])

@@ -112,8 +112,8 @@ def test_modes_are_those_of_drakes_arm(kind, program, tmp_path):
     from drake_arm import PERIOD, DrakeArm, eigenvalues
     model, base, start, cutoff, stiffness, damping, friction = ARMS[kind]
     config, log, says = (tmp_path / name for name in ("drive.yaml", "drive.lcm", "says"))
-    # Constant damping, and the friction that Drake's arm has. The clock of commands is that of the
-    # wall, which the simulation does not keep to.
+    # Constant damping, and the friction that Drake's arm has. Commands use the wall clock, which
+    # differs from the clock of the simulation.
     text = (ROOT / f"controller/examples/{model}_drive.yaml").read_text()
     text, constant = re.subn("damping_ratio: 0.8", f"damping: {damping}", text)
     assert constant == 1

@@ -32,7 +32,7 @@ def test_audit_gains():
 
 
 def test_release():
-    """The ratios are those of `./run demo`: two dampings ring, the third settles."""
+    """The ratios are the same as in `./run demo`: two dampings ring, the third settles."""
     text = run("release.py", PANDA)
     settled = re.findall(r"to within 2 % of 20 mm in (.*),", text)
     assert settled[0] == "more than 5 s"

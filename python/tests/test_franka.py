@@ -37,7 +37,7 @@ def settings(**changes):
 
 
 class State:
-    """What pylibfranka tells of a robot that stands still."""
+    """A state from pylibfranka of a robot that stands still."""
 
     END = np.array(dashpot.Robot.from_urdf(ROOT / "sim/models/fr3.urdf", "fr3_link0",
                                            "fr3_hand_tcp").pose(HOME))
@@ -251,7 +251,7 @@ def test_a_state_that_is_lost_ends_the_motion_when_its_fault_latches(run, ticks)
 
 
 def test_an_arm_that_needs_its_brakes_ends_the_motion_at_once(run, capfd):
-    """The worst status is told, not the first fault."""
+    """The worst status is reported, not the first fault."""
     robot = MovingRobot(events={500: go, 990: lambda robot: setattr(robot, "tick", robot.tick + 30),
                                 1000: MovingRobot.freeze})
     report = run(robot)
@@ -279,7 +279,7 @@ def test_a_set_point_that_is_not_possible_is_refused(parts, reason):
 
 
 def test_the_set_point_stays_in_force(run):
-    """Nobody repeats it; the loop does, or it would be stale after a tenth of a second."""
+    """The loop repeats the set-point; otherwise it would be stale after a tenth of a second."""
     def moved(robot):
         robot.session.set_setpoint(joint_position=np.array(HOME) + 0.02)
     report = run(MadeUpRobot(events={10: moved}), duration=1)
@@ -403,8 +403,8 @@ def seen_modes(log, windows):
 
 
 def check_modes(log, windows):
-    """The sampled modes published last in the windows are those of the arm's motion. The model of
-    franky-sim has other masses: by up to 4 % in the mass matrix."""
+    """The sampled modes published last in the windows agree with the arm's motion. The masses in
+    franky-sim's model differ: by up to 4 % in the mass matrix."""
     published = log["DASHPOT_SAMPLED_MODES"]
     row = np.flatnonzero(published["tick"] <= windows[-1][1])[-1]
     seen = seen_modes(log, windows)

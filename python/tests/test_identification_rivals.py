@@ -224,8 +224,8 @@ def koma(record, kind, count, rows, order, weighting="none"):
 
     if kind == "decays":
         y, period = means(record, count)
-        # Correlations are divided by the number of samples that overlap, which damps those of a
-        # decay less than it is; with zeros after it hardly.
+        # Correlations are divided by the number of samples that overlap, so a decay seems less
+        # damped than it is; zeros after the decay nearly remove this error.
         y = np.vstack([y, np.zeros((100 * len(y), y.shape[1]))])
     else:
         y, period = decimate(record.y, count, axis=0, ftype="fir"), record.period * count

@@ -1,5 +1,5 @@
-"""One loop: all commands and Python say the same modes and gain margins of the same arm, and the
-margins are those of numpy on mass matrix, Jacobian and gradient of gravity by Pinocchio."""
+"""One loop: all commands and Python report the same modes and gain margins of the same arm. numpy
+computes the same margins from Pinocchio's mass matrix, Jacobian and gradient of gravity."""
 
 import http.client
 import json
@@ -17,7 +17,7 @@ try:
 except ImportError:
     pin = linalg = None
 
-SLOWEST = 1  # rad/s: what is slower does not count in a margin
+SLOWEST = 1  # rad/s: slower motions do not count in a margin
 STEP = 1.25  # from one factor to the next that is tried
 ARMS = {"panda": ("panda_link0", "panda_hand_tcp"), "iiwa14": ("iiwa_link_0", "iiwa_link_ee_kuka"),
         "ur5": ("base_link", "ee_link"), "fr3": ("fr3_link0", "fr3_hand_tcp"),
@@ -29,7 +29,7 @@ def words(values):
 
 
 def said(program, *options):
-    """What the program says in JSON; None where it says no."""
+    """The program's JSON; None if it refuses."""
     done = subprocess.run([program, *map(str, options), "--json"], capture_output=True, text=True)
     assert done.returncode in (0, 1, 2), done.stderr
     return json.loads(done.stdout) if done.returncode == 0 else None
@@ -93,7 +93,7 @@ def any_case(rng, number, root):
 
 
 def keywords_of(config):
-    """Those of from_urdf and of audit for a configuration."""
+    """The keywords of from_urdf and of audit for a configuration."""
     robot = {key: value for key, value in config["robot"].items()
              if key not in ("urdf", "base", "tip", "payload")}
     robot["payload_mass"] = config["robot"].get("payload", {}).get("mass", 0)
@@ -124,7 +124,7 @@ def options_of(config, loop):
 
 
 def same_modes(found, expected):
-    """Eigenvalues, in whatever order those of overdamped modes are paired."""
+    """Eigenvalues, independent of the pairing of overdamped modes."""
     def sorted_of(values):
         values = np.asarray(values).reshape(-1)
         return values[np.lexsort((values.imag, np.round(abs(values), 9)))]
@@ -271,7 +271,7 @@ def margin(loop):
 
 
 def random_case(rng, number):
-    """Name of the arm, keywords of the robot, those of the audit."""
+    """Name of the arm, keywords of the robot, keywords of the audit."""
     name = list(ARMS)[number % len(ARMS)]
     n = 6 if name == "ur5" else 7
     robot = {"viscous_friction": rng.uniform(0.02, 0.5, n) * (number % 3 > 0),

@@ -1,4 +1,4 @@
-"""Arms whose gears bend, beside MuJoCo, which shares no code with the controller or the simulator.
+"""Arms with elastic gears, beside MuJoCo, which shares no code with the controller or the simulator.
 
 A joint with an elastic gear is two joints of MuJoCo about one axis: theta, with the inertia and the
 friction of the motor, and q - theta, with the gear's spring and damper. Skipped without MuJoCo.
@@ -29,7 +29,7 @@ class Arm:
         for motor in [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE]:
             motor.parent.add_joint(name=f"{motor.name} gear", type=motor.type, axis=motor.axis,
                                    pos=motor.pos)
-            motor.armature = 0.1  # any, so that it has an inertia beside that of the link
+            motor.armature = 0.1  # any, so that the motor has an inertia of its own
         self.model = model = spec.compile()
         model.opt.timestep = step
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
@@ -162,7 +162,7 @@ def closed(A, B, C, law, delay, cutoff):
 
 
 def motions(map_):
-    """Returns the discrete eigenvalues, but for those of torques that are forgotten at once."""
+    """Returns the discrete eigenvalues, without the zeros of torques that are forgotten at once."""
     z = np.linalg.eigvals(map_).astype(complex)
     return z[abs(z) > 1e-12]
 

@@ -101,8 +101,8 @@ def test_the_arm_moves_as_its_modes_say(tmp_path):
         nearest = seen[np.argmin(abs(seen - omega * (-zeta + 1j * np.sqrt(1 - zeta**2))))]
         print(f"{omega:.3f} rad/s, ratio {zeta:.4f}; MuJoCo {abs(nearest):.3f}, "
               f"{-nearest.real / abs(nearest):.4f}")
-        # The sensor's are those of a loop without a hold. MuJoCo moves by the new velocity, which
-        # makes up for most of it.
+        # The sensor shows the modes of a loop without a hold. MuJoCo moves by the new velocity,
+        # which compensates most of the hold.
         assert abs(nearest) == pytest.approx(omega, rel=0.02)
         assert -nearest.real / abs(nearest) == pytest.approx(zeta, abs=0.01)
 
@@ -205,8 +205,8 @@ def test_an_arm_that_needs_its_brakes_is_named_once(tmp_path, capfd):
     ({"goal": "moon"}, "the model has no body 'moon'"),
     ({"integrator": "RK4"}, "RK4 has states between steps"),
     ({"period": "1.5 ms"}, "no multiple of the model's timestep"),
-    ({"release": "0"}, "'0' is no index of userdata, which has 0 numbers"),
-    ({"release": "1x"}, "'1x' is no index of userdata"),
+    ({"release": "0"}, "'0' is not an index of userdata, which has 0 numbers"),
+    ({"release": "1x"}, "'1x' is not an index of userdata"),
     ({"lcm_url": "nonsense"}, "nonsense")])
 def test_what_does_not_fit_is_refused(attributes, reason, tmp_path, capfd):
     with pytest.raises(Exception):  # noqa: B017  # of MuJoCo, whose kind is not said

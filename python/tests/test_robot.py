@@ -119,7 +119,7 @@ def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
     held = dashpot.closed_loop(panda, HOME, task_stiffness=TASK["task_stiffness"],
                                task_damping_ratio=0.7)
     np.testing.assert_allclose(held.modes.damping_ratio[:6], 0.7, atol=0.05)  # and friction
-    q = np.array(HOME) + 0.3  # where the axes of the tool are not those of the base
+    q = np.array(HOME) + 0.3  # where the tool's axes differ from the base's
     R = np.kron(np.eye(2), panda.pose(q)[:3, :3])
     K = np.diag([2000.0, 600, 100, 10, 20, 30])
     tool = dashpot.closed_loop(panda, q, task_stiffness=K, task_damping=[0] * 6, frame="tool")
@@ -146,7 +146,7 @@ def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
 def test_degrees_percent_and_transposed_tools_are_told(panda, config):
     with pytest.warns(UserWarning, match="if these are degrees"):
         panda.mass([0, -45, 0, -135, 0, 90, 45])
-    with pytest.warns(UserWarning, match="70 is no percentage"):
+    with pytest.warns(UserWarning, match="70 is not a percentage"):
         dashpot.design_damping([[1]], [[100]], damping_ratio=70)
     arm = config["robot"]
     tool = np.eye(4)

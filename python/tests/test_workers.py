@@ -93,7 +93,7 @@ def test_regions_are_lowered_to_what_every_loop_bears(panda):
     (dict(task_stiffness=[1] * 6, samples=9, period=1e-3, gain_margin=0.5), "the gain margin has to be at least 1"),
     (dict(), "give one of task_stiffness and joint_stiffness"),
     (dict(task_stiffness=[1] * 6), "a region without postures"),
-    (dict(task_stiffness=[1] * 6, samples=9, structure="round"), "none of full, block and diagonal"),
+    (dict(task_stiffness=[1] * 6, samples=9, structure="round"), "not one of full, block, diagonal"),
     (dict(task_stiffness=[1] * 6, samples=9, largest_ratio=0.5), "below the one wanted"),
     (dict(task_stiffness=[1] * 6, postures=[[0, 1]]), "postures: has 2 entries"),
 ])
