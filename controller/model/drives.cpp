@@ -173,7 +173,7 @@ const Drives& find_drives(std::string_view name) {
     names += (names.empty() ? "" : ", ") + std::string(drives.name);
   }
   throw InvalidModel("'" + text::printable(std::string(name)) + "' is not one of " + names +
-                     ", and no drives file (.yaml)");
+                     ", and not a drives file (.yaml)");
 }
 
 const Drives& find_drives(std::string_view name, int n) {
