@@ -39,6 +39,25 @@ void EnergyTank::count_work(const JointVector& q, const JointVector& weight, dou
   weight_ = weight;
 }
 
+namespace {
+
+/// Returns the torque of the dampers if no reference moved, n.
+JointVector torque_against(const ImpedanceLaw::Input& law) noexcept {
+  const auto& [robot, q, qd, impedance, null_space, references, clamp, wrench, integral] = law;
+  JointVector back = JointVector::Zero(qd.size()), result = back;
+  add(qd, back, -1);
+  add_product(impedance.joint_damping, back, result);
+  if (impedance.task_weight > 0) {
+    const Matrix6 C = impedance.base.damping + turned(impedance.tool.damping, robot.R_BT);
+    add_torque(robot.J, C * twist(robot.J, back), result);
+    if (impedance.null_space()) add(null_space.damper(impedance.null_damping, back), result);
+    if (impedance.null_damping_ratio > 0) add(null_space.ratio_damper(back), result);
+  }
+  return result;
+}
+
+}  // namespace
+
 bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight,
                        LawTorque& asked) noexcept {
   constexpr double kReserve = 0.01, kSoft = 0.1;  // of the store
@@ -70,7 +89,7 @@ bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight
     weakened_.tool.stiffness *= share_;
     weakened_.null_stiffness *= share_;
   }
-  JointVector further = difference(asked.torque, asked.dampers);  // feed-forward
+  JointVector further = difference(asked.torque, torque_against(law));
   add(pull, further, -1);
   add(weight, further, -1);
   double fed = 1;

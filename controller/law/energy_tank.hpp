@@ -15,8 +15,10 @@ namespace dashpot::controller {
 ///     E = 1/2 (e_q' K_q e_q + e' K_C e + e_0' K_0 e_0).
 /// - Springs act with the share s = min(1, (S - reserve) / E) of their torque: they cannot release
 ///   more than there is. Gains that grow and references that move away so wait for energy.
-/// - Feed-forward that adds energy shrinks as S - reserve - s E falls below a tenth of the store.
-/// - Dampers act in full, and what they dissipate returns to S, which is at most store + s E.
+/// - Feed-forward that adds energy, also of dampers between the arm and references that move,
+///   shrinks as S - reserve - s E falls below a tenth of the store.
+/// - What dampers would do if no reference moved acts in full, and what they dissipate returns to
+///   S, which is at most store + s E.
 /// Viscous friction of the model counts with b dq^2 / T, which it dissipates at least, and Coulomb
 /// friction with c (|dq| - 0.0028 rad/s T), less than c tanh(v / 0.01 rad/s) dissipates.
 class EnergyTank {
