@@ -22,7 +22,7 @@ struct Attachment {
   bool operator==(const Attachment& other) const noexcept;
 };
 
-/// Returns (1 - s) a + s b, with the tool's rotation on the short way from that of a to that of b.
+/// Returns (1 - s) a + s b; the tool's rotation goes the short way from a to b.
 Attachment blend(const Attachment& a, const Attachment& b, double s) noexcept;
 
 /// Returns where the frame `to` of the tip link is (in B), if its frame `from` is at `pose`.

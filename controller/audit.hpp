@@ -12,7 +12,7 @@
 
 namespace dashpot::controller {
 
-/// What a posture does to the gains, in three numbers.
+/// Three numbers of the loop that gains make at a posture.
 struct PostureNumbers {
   /// Smallest damping ratio of the modes that are not soft. NaN if there is none.
   double smallest_ratio = std::numeric_limits<double>::quiet_NaN();
@@ -27,7 +27,7 @@ struct PostureNumbers {
   bool singular = false;  ///< there are more zero modes than joints beyond the task's directions
 };
 
-/// What the rotors would change that the model does not tell of.
+/// What the reflected inertia that the model lacks would change.
 struct MissingRotors {
   /// Reflected inertia of the joints without (n, kg m^2; zero where none is needed) with which the
   /// loop has AuditOptions::margin, see enough_reflected_inertia. All zero if the loop has the
@@ -93,7 +93,7 @@ struct DampingSuggestion {
 /// at rest, where the springs are at rest. The gain margin counts an integral of the springs as
 /// well; ratios and poles are those without it. M has the reflected inertia and the payload of the
 /// model, and viscous friction is the model's. Gravity is compensated exactly in the modes, and in
-/// the gain margin as late as LoopTiming says. With elastic joints the loop is that of
+/// the gain margin as late as LoopTiming says. With elastic joints the loop has the coordinates of
 /// analysis::Gears.
 ///
 /// An Audit does not change: several threads may use one at once.
@@ -114,16 +114,16 @@ class Audit {
   /// entries.
   PostureNumbers numbers(const JointVector& q) const;
 
-  /// Computes the numbers of another loop with the same springs at q, such as that of a
-  /// PostureLoop, from its mass, damping and stiffness factor. Returns none where numbers(q) would
-  /// leave it to audit().
+  /// Computes the numbers of another loop with the same springs at q, such as the loop of a
+  /// PostureLoop, from its mass, damping and stiffness factor. Returns nothing where numbers(q)
+  /// would leave the posture to audit().
   std::optional<PostureNumbers> numbers(const LoopAt& loop) const;
 
   /// Computes modes and numbers at q with proved bounds. Throws like numbers(), and
   /// std::runtime_error if the eigenvalue iteration fails.
   PostureAudit audit(const JointVector& q) const;
 
-  /// Returns what rotors would change at a posture, of which audit() has found `found`.
+  /// Returns what rotors would change at the posture for which audit() returned `found`.
   MissingRotors missing_rotors(const PostureAudit& found) const;
 
   /// Returns posture `index` (from 0) of the sequence `seed`. It is spread evenly over the range of
@@ -182,9 +182,8 @@ class Audit {
   std::optional<Settings> designed_;  ///< of the controller that designs damping for ratios
 };
 
-/// Summarizes postures by their `numbers`; posture(i) returns the i-th posture. The numbers in the
-/// result are those of Audit::audit, with proved bounds, so that `numbers` only decide at which
-/// postures.
+/// Summarizes postures by their `numbers`; posture(i) returns the i-th posture. `numbers` only
+/// select the postures; the numbers in the result come from Audit::audit, with proved bounds.
 WorkspaceAudit summarize(const Audit& audit, const std::vector<PostureNumbers>& numbers,
                          const std::function<JointVector(std::int64_t)>& posture);
 

@@ -53,8 +53,8 @@ text::Units joint_units(const RobotModel& model, const char* revolute, const cha
 /// Whether stiffness and damping may be given one without the other.
 enum class GainPairs { kTogether, kEither };
 
-/// Sets those of `gains` that stand under the key `gains` of `parent`. Whether the matrices are
-/// possible is not checked. Throws InputError.
+/// Sets the members of `gains` that the key `gains` of `parent` contains. Does not check whether
+/// the matrices are possible. Throws InputError.
 void read_gains(const text::YamlMapping& parent, const RobotModel& model, GainPairs pairs,
                 Gains& gains);
 

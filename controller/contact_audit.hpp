@@ -11,7 +11,7 @@ namespace dashpot::controller {
 /// The surroundings that a tip touches: a spring of any stiffness, with a damper and a mass, along
 /// one direction.
 struct ContactOptions {
-  /// In the base's axes, of any length but zero; none: the direction that bears least.
+  /// In the base's axes, of any length but zero; none: the direction with the least limit.
   std::optional<Eigen::Vector3d> direction;
   double damping = 0;  ///< b, N s/m
   double mass = 0;     ///< m, kg
@@ -27,8 +27,8 @@ struct ContactAt {
 /// The largest force of the joints in a direction, beside the weight of the arm.
 struct HeldForce {
   Eigen::Vector3d direction;  ///< in which the tip presses, of length 1, in the base's axes
-  double force = 0;           ///< until a joint is at its effort limit, N; infinite: none is
-  int joint = -1;             ///< which is, from 0; -1: none
+  double force = 0;           ///< at which the first joint reaches its effort limit, N; or infinity
+  int joint = -1;             ///< the joint at its limit, from 0; -1: none
   /// How far the springs are pressed in with that force, m, beyond which they are springs no more;
   /// infinite where no spring acts.
   double deflection = 0;
@@ -46,14 +46,14 @@ struct ContactAudit {
   std::vector<HeldForce> forces;  ///< along the touch, against it, and along all axes of the base
 };
 
-/// Returns the limit at q (n, rad) without proved bounds; where no direction is asked for, the
-/// least of 13 directions spread over the half sphere. Throws like Audit::numbers, and
+/// Returns the limit at q (n, rad) without proved bounds. Without a direction in the options, it is
+/// the least of 13 directions spread over the half sphere. Throws like Audit::numbers, and
 /// std::invalid_argument without a period, for what ContactOptions does not allow, and for a
 /// direction in which the tip cannot move.
 ContactAt find_contact(const Audit& audit, const JointVector& q, const ContactOptions& options);
 
-/// Returns what the arm bears and holds at q, with a proved bracket of the limit. The direction
-/// that bears least is then refined to 0.01 rad. Throws likewise.
+/// Returns the limit of a touch at q, with a proved bracket, and the forces that the joints can
+/// hold. The direction with the least limit is then refined to 0.01 rad. Throws likewise.
 ContactAudit audit_contact(const Audit& audit, const JointVector& q, const ContactOptions& options);
 
 /// Returns the least damped motion at q for each stiffness (N/m) of a touch in options.direction.

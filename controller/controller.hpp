@@ -43,7 +43,7 @@ class Controller {
   /// tick. The torque is safe to send with every status (see Status). The work is bounded, without
   /// allocation, lock, exception or system call.
   Status update(const RobotState& state, const Setpoint& setpoint, JointVector& torque) noexcept;
-  /// Does one tick without a set-point: the last one stays in force, or, before the first, the
+  /// Does one tick without a set-point: the last one stays, or, before the first, the
   /// springs where the robot was found. It grows old as any other (Watchdog::setpoint_hold, ...).
   Status update(const RobotState& state, JointVector& torque) noexcept;
 
@@ -55,9 +55,9 @@ class Controller {
   /// long as there is none since the last reset. One thread, always the same, may call this; it may
   /// be another thread than the one that calls `update`. The result is valid until the next call.
   const SampledVibration* sampled_vibration() noexcept;
-  /// Sets `system` to the closed loop at the last tick, linearised where its springs are at rest,
-  /// in joint coordinates (vibration/closed_loop.hpp) or those of analysis::Gears: mass, damping,
-  /// stiffness and its factor. Must not be called before the first good state.
+  /// Sets `system` to the closed loop at the last tick, linearised where its springs are at rest:
+  /// mass, damping, stiffness and its factor, in joint coordinates (vibration/closed_loop.hpp) or
+  /// in the coordinates of analysis::Gears. Must not be called before the first good state.
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept;
 
   /// Forgets everything, faults as well: the next tick is like the first, and keeps the robot where
@@ -68,7 +68,7 @@ class Controller {
   /// robot applies now.
   void reset(const JointVector& torque) noexcept;
   /// Releases a latched fault (see Status), unless the cause of the fault is still present. From
-  /// the next tick on the springs start where the robot is, with the gains in force, and keep it
+  /// the next tick on the springs start where the robot is, with the current gains, and keep it
   /// there until there is another set-point. Does nothing if there is no fault.
   void release() noexcept;
 
@@ -79,13 +79,13 @@ class Controller {
   /// Changes what is attached to the tip link within Motion::gain_time: from the next tick on the
   /// weight, M and all that follows from them go evenly to their new values. If the tool's frame T
   /// changes, springs keep their extension: reference and goal stay where they are on the tip link.
-  /// A pose of the tip in a later set-point is one of the new T, also while T is on its way. Stays
-  /// in force in faults and resets; after a reset there is no way left.
+  /// A pose of the tip in a later set-point is one of the new T, also while T is on its way. Faults
+  /// and resets keep the attachment; a reset ends its change at once.
   void attach(const Attachment& attachment) noexcept;
-  /// Sets limits of the tip's speed from the next tick on; where they exceed those of the settings,
-  /// the settings' limits hold. With a lower TipSpeed::limit the reference takes the tip with at
-  /// most 0.6 of it. In mode kJoint the reference keeps to them where the robot is, and without
-  /// them to Motion::velocity alone. A tip that is faster just then is a fault. Resets keep them.
+  /// Sets limits of the tip's speed from the next tick on; lower limits of the settings still hold.
+  /// With a lower TipSpeed::limit the reference moves the tip with at most 0.6 of it. In mode
+  /// kJoint the reference keeps to these limits at the robot's posture, and without them to
+  /// Motion::velocity alone. A tip that is faster at that moment is a fault. Resets keep them.
   void limit_tip_speed(const TipSpeed& speed) noexcept;
 
   int joints() const noexcept;  ///< n

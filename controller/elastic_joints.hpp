@@ -6,7 +6,7 @@ namespace dashpot::controller {
 
 using analysis::PassivePart;
 
-/// Returns the gears of a model for the analysis. Those of a model without elastic joints are none.
+/// Returns the gears of a model for the analysis; without elastic joints they are empty.
 analysis::Gears elastic_joints(const RobotModel& model);
 
 }  // namespace dashpot::controller

@@ -49,13 +49,13 @@ typedef struct dashpot_controller dashpot_controller;
 /* What functions return.
  *
  * Zero and above: the status of a tick. If several conditions hold, the most severe, the last in
- * this list, is returned. Before DASHPOT_SETPOINT_STALE the torque is that of the springs, dampers
- * and feed-forward, within the limits. From there on each status names its output:
+ * this list, is returned. Before DASHPOT_SETPOINT_STALE the torque comes from springs, dampers and
+ * feed-forward, within the limits. From there on each status names its output:
  *   hold: the springs stop where they are, whatever the set-point says; no commanded wrench.
  *   damp: a brake, which holds the arm once it stands, and the weight of the arm where the
  *         controller compensates it.
- *   ramp: the last torque for watchdog.longest_gap; then the last known weight, and a brake by what
- *         the model says of the last good state; after 2 s the torque goes to zero within 0.1 s.
+ *   ramp: the last torque for watchdog.longest_gap; then the last known weight, and a brake for the
+ *         motion that the model predicts; after 2 s the torque goes to zero within 0.1 s.
  * Where damp and ramp take torque away, it fades evenly, in all joints alike.
  *
  * Faults latch. After any "damp" but DASHPOT_SETPOINT_LOST, after DASHPOT_STATE_FROZEN, and after a
@@ -74,7 +74,7 @@ enum {
   DASHPOT_LITTLE_MARGIN = 3,      /* springs too stiff for the sampled loop: no damping ratio, or no
                                       lower one, keeps limits.gain_margin here */
   DASHPOT_WRENCH_NOT_FINITE = 4,  /* NaN or infinity in the external wrench; the last finite one
-                                     stays in force. With limits.external_force: a collision */
+                                     stays. With limits.external_force: a collision */
   DASHPOT_SETPOINT_REJECTED = 5,  /* the set-point is not possible; the last good one stays */
   DASHPOT_WEIGHT_NOT_HELD = 6,    /* the weight needs more than a torque limit: the arm sinks */
   DASHPOT_SETPOINT_STALE = 7,     /* the set-point is old: hold */
@@ -111,7 +111,7 @@ enum {
 
 /* Where the springs are fixed: to a joint position, or to a pose of the tip. */
 enum { DASHPOT_MODE_JOINT = 0, DASHPOT_MODE_CARTESIAN = 1 };
-/* In whose axes the gains of the task are given: B's or T's. */
+/* The axes in which the gains of the task are given: B's or T's. */
 enum { DASHPOT_FRAME_BASE = 0, DASHPOT_FRAME_TOOL = 1 };
 
 /* How a mode moves; docs/concepts.md has the terms. */
@@ -231,9 +231,9 @@ typedef struct dashpot_snapshot {
   double tip_position[3];              /* of T in B, m */
   double tip_rotation[9];              /* 3 x 3, turns T's axes into B's */
   /* Where the joint springs are fixed just now; in the Cartesian mode the posture; rad. While no
-   * springs are in force, `position`. */
+   * springs act, `position`. */
   double reference_joint_position[DASHPOT_MAX_JOINTS];
-  /* Where the Cartesian springs are fixed just now, m; while none are in force, where T is. */
+  /* Where the Cartesian springs are fixed just now, m; while none acts, where T is. */
   double reference_tip_position[3];
   double reference_tip_rotation[9];      /* 3 x 3, likewise */
   double law_torque[DASHPOT_MAX_JOINTS]; /* torque of the impedance law, or of "damp", before the
@@ -241,14 +241,14 @@ typedef struct dashpot_snapshot {
   double tip_error[6];  /* from tip to reference: difference of positions, m, and rotation
                            vector, rad */
   double tip_wrench[6]; /* wrench of Cartesian springs, dampers and feed-forward, N and N m */
-  /* The damping ratios for which the damping of the springs in force is designed; 0: given. */
+  /* The damping ratios for which the damping of the active springs is designed; 0: given. */
   double joint_damping_ratio;
   double task_damping_ratio;
-  double damping_level; /* share of its ratio that the mode has that the sampled loop leaves least,
-                           those of the null space too; 1: the loop bears all ratios */
-  double energy_store; /* left in the energy tank, J; infinite if control.energy is free */
-  double spring_share; /* of the springs' torque that the energy in the tank allows; 1: all */
-  /* What the arm counts with at this tick, on the way to what dashpot_set_payload was told. */
+  double damping_level; /* smallest share of its damping ratio that the sampled loop leaves a mode,
+                           also in the null space; 1: it keeps its margin with all ratios */
+  double energy_store;  /* left in the energy tank, J; infinite if control.energy is free */
+  double spring_share;  /* of the springs' torque that the energy in the tank allows; 1: all */
+  /* Payload and tool at this tick, on their way to the arguments of dashpot_set_payload: */
   double payload_mass;       /* kg */
   double payload_center[3];  /* from the tip link's origin, in its axes, m */
   double payload_inertia[9]; /* 3 x 3, about the centre of mass, kg m^2 */
@@ -364,7 +364,7 @@ typedef struct dashpot_closed_loop {
 
 /* Creates a controller from a YAML file (see controller/examples/panda.yaml) and the URDF that the
  * file names. Returns NULL on failure; dashpot_last_error then says why, in one line with file, key
- * and line. Gains that dashpot_set_gains would refuse are a failure. */
+ * and line. It also fails if dashpot_set_gains would refuse the gains. */
 dashpot_controller* dashpot_create(const char* config_path);
 
 /* Creates a controller from the text of such a file. A relative path of the URDF begins at
@@ -375,12 +375,11 @@ dashpot_controller* dashpot_create_from_text(const char* text, const char* direc
 void dashpot_destroy(dashpot_controller* controller);
 
 /* Returns a one-line description of the last error in this thread; "" if the last call succeeded,
- * or what to be warned of if dashpot_set_gains or dashpot_set_payload took it nevertheless.
- * Calls that count are dashpot_create, ..._create_from_text, dashpot_start, dashpot_set_setpoint,
- * dashpot_set_gains, dashpot_judge_gains, dashpot_set_payload, dashpot_limit_tip_speed,
- * dashpot_evaluate, dashpot_analyze, dashpot_release, dashpot_read_snapshot, ..._modes and
- * ..._sampled_modes. The text is valid until the next of these calls in this thread.
- */
+ * or a warning if dashpot_set_gains or dashpot_set_payload succeeded with one. Calls that count are
+ * dashpot_create, ..._create_from_text, dashpot_start, dashpot_set_setpoint, dashpot_set_gains,
+ * dashpot_judge_gains, dashpot_set_payload, dashpot_limit_tip_speed, dashpot_evaluate,
+ * dashpot_analyze, dashpot_release, dashpot_read_snapshot, ..._modes and ..._sampled_modes. The
+ * text is valid until the next of these calls in this thread. */
 const char* dashpot_last_error(void);
 
 /* Returns n; 0 if `controller` is NULL. */
@@ -395,28 +394,27 @@ double dashpot_period(const dashpot_controller* controller);
  * Takes bounded time, allocates nothing and waits for nothing.
  *
  * If `setpoint` is NULL, the tick takes up the latest set-point of dashpot_set_setpoint; if there
- * is no new one, the last set-point stays in force. As long as there is none at all, the robot
+ * is no new one, the last set-point stays. As long as there is none at all, the robot
  * stays where it is. Give set-points either here or to dashpot_set_setpoint, not both. New gains
  * take effect at the next tick whose set-point is NULL or new by its time.
  *
  * Returns a status, or a negative code. With a negative code `output` is not written, and the host
  * has to bring the robot to a stop. A state that is NULL or wrong, also in its struct_size, is not
- * refused: it gives a torque and a status. A wrong set-point is rejected, and the last one stays in
- * force. */
+ * refused: it gives a torque and a status. A wrong set-point is rejected, and the last one stays.
+ * */
 int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* state,
                        const dashpot_setpoint* setpoint, dashpot_output* output);
 
 /* Prepares the loop before it begins, with the robot at rest at `position` (n, rad). Judges the
- * gains, those of dashpot_set_gains or else of the configuration, at `position` as
- * dashpot_set_gains does, and then resets as dashpot_reset does. `torque` (n, N m) is the torque
- * that the robot applies now; NULL stands for the arm's weight at `position` (zero where the robot
- * compensates it). Refuses a position beyond the limits of the URDF, as that of degrees is, and a
- * torque that contradicts the weight (`watchdog.start_torque`; none accepts it). Takes some
- * milliseconds and allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error then says
- * more, and with DASHPOT_OK, where it is not empty, that limits.torque_rate makes stops slow, or
- * that gains look like another unit or order, of which dashpot_set_gains warns as well. A loop
- * without this call starts from the weight as well, but with gains that were not judged at its
- * posture. */
+ * gains of dashpot_set_gains, or else of the configuration, at `position` as dashpot_set_gains
+ * does, and then resets as dashpot_reset does. `torque` (n, N m) is the torque that the robot
+ * applies now; NULL stands for the arm's weight at `position` (zero if the robot compensates it).
+ * Refuses a position beyond the limits of the URDF, such as one in degrees, and a torque that
+ * contradicts the weight (`watchdog.start_torque`; none accepts it). Takes some milliseconds and
+ * allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error then says more. With
+ * DASHPOT_OK it is empty, or warns that limits.torque_rate makes stops slow, or that gains look
+ * like another unit or order, as dashpot_set_gains does. A loop without this call starts from the
+ * weight as well, but its gains were not judged at its posture. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 
 /* Forgets history, faults and set-point, but not the gains. Called on the real-time thread. The
@@ -444,15 +442,15 @@ int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpo
 /* Sets the gains that the next tick takes up; of several, the latest. Called on the other thread.
  * Returns DASHPOT_OK or a negative code.
  *
- * Gains that are new are judged, which takes some milliseconds and allocates. Gains are refused
+ * Judges new gains, which takes some milliseconds and allocates. Gains are refused
  * (DASHPOT_UNSTABLE_GAINS) if the sampled loop, with the delay and the filters of analysis.sampled,
- * would have less than limits.gain_margin in either mode at the latest posture: that of the latest
- * tick with a good state, or of dashpot_start. As long as there was neither, gains are refused if
+ * would have less than limits.gain_margin in either mode at the latest posture: the posture of the
+ * latest tick with a good state, or of dashpot_start. If both are missing, gains are refused if
  * they have this margin at none of eight postures spread over the position limits. Motions slower
  * than 1 rad/s do not count: those that need more than 6 s to swing, or a second to grow e-fold.
- * Damping that is designed for a ratio has to leave a margin of 1.2 to the arm without its payload,
- * too, which may be dropped. Where the margin is too little already, gains with a larger one are
- * taken, and dashpot_last_error says what is missing. */
+ * Damping that is designed for a ratio also has to leave a margin of 1.2 to the arm without its
+ * payload, which may be dropped. If the margin is too small already, gains with a larger one are
+ * accepted, and dashpot_last_error says what is missing. */
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
 
 /* Judges gains as dashpot_set_gains does, without setting them. May be called on any thread, for
@@ -466,30 +464,30 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
                             const double* position, double* margin);
 
-/* Tells what the arm carries from now on, and where its tool is. Called on the other thread. The
- * next tick begins to take it up, and within motion.gain_time the weight, the inertia and all that
- * follows from them have gone evenly to their new values. In a fault the weight that is held
- * follows as well; dashpot_reset and dashpot_start keep the payload and leave no way to go.
- * `gains` that come with it go to their values in the same time.
+/* Sets what the arm carries from now on, and where its tool is. Called on the other thread. The
+ * next tick begins the change, and within motion.gain_time the weight, the inertia and all that
+ * follows from them go evenly to their new values. In a fault the weight that is held follows as
+ * well; dashpot_reset and dashpot_start keep the payload and end the change at once. `gains` that
+ * come with it go to their values in the same time.
  *
  * A new T moves no spring: reference and goal keep their places on the tip link. The pose of a
- * set-point is one of the T told before it, on the same thread. For dashpot_update that is the T of
+ * set-point refers to the T set before it, on the same thread. For dashpot_update that is the T of
  * a call that an earlier tick has taken up.
  *
- * Refused (DASHPOT_WRONG_VALUE) is what no body can be, and a weight that limits.torque does not
- * hold at the latest posture, unless it is less than now; and (DASHPOT_UNSTABLE_GAINS) what leaves
- * the gains too little margin, as in dashpot_set_gains: those that come with it, or else those in
- * force. What is refused changes nothing. Takes some milliseconds and allocates. Returns DASHPOT_OK
- * or a negative code. */
+ * Refuses (DASHPOT_WRONG_VALUE) an impossible body, and a weight that limits.torque does not hold
+ * at the latest posture, unless it is less than now. Refuses (DASHPOT_UNSTABLE_GAINS) a change that
+ * leaves the new gains, or else the current ones, too little margin, as in dashpot_set_gains. A
+ * refused call changes nothing. Takes some milliseconds and allocates. Returns DASHPOT_OK or a
+ * negative code. */
 int32_t dashpot_set_payload(dashpot_controller* controller, const dashpot_payload* payload);
 
 /* Limits the tip's speed from the next tick on. Called on the other thread. `linear` (m/s) and
- * `angular` (rad/s) are those of the reference on its way to a set-point, `limit` (m/s) that of the
- * tip's origin, beyond which it is a fault. Each is 1e-4 or more, and at most what the
- * configuration says (motion.linear_velocity, motion.angular_velocity, limits.tip_velocity);
- * infinity stands for that. With a lower `limit` the reference moves with at most 0.6 of it. In the
- * joint mode the reference keeps to what is not infinity, where the robot is. A tip that is faster
- * just then is a fault. Resets keep the limits. Returns DASHPOT_OK or a negative code. */
+ * `angular` (rad/s) limit the reference on its way to a set-point; the speed of the tip's origin
+ * beyond `limit` (m/s) is a fault. Each is 1e-4 or more, and at most the value of the configuration
+ * (motion.linear_velocity, motion.angular_velocity, limits.tip_velocity), for which infinity
+ * stands. With a lower `limit` the reference moves with at most 0.6 of it. In the joint mode the
+ * reference keeps to the finite limits at the robot's posture. A tip that is faster at that moment
+ * is a fault. Resets keep the limits. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_limit_tip_speed(dashpot_controller* controller, double linear, double angular,
                                 double limit);
 
@@ -503,10 +501,10 @@ int32_t dashpot_evaluate(const dashpot_controller* controller, const double* pos
 /* Finds the closed loop and its modes at `position` (n, rad), with the robot at rest there, in
  * `mode` (DASHPOT_MODE_JOINT, ...), as a loop would publish them: no loop has to run. A member of
  * `gains` that is NULL, or all if `gains` is NULL, stands for the gain of the configuration.
- * Payload and tool are those told last. `loop` or `modes` may be NULL; the caller sets the
+ * Payload and tool are the latest ones set. `loop` or `modes` may be NULL; the caller sets the
  * struct_size of the other. The modes are solved directly (`tick`, `time` and the counters are 0).
- * Position limits and the brake do not count. May be called on any thread, also beside a
- * running loop; takes some milliseconds and allocates. Returns DASHPOT_OK or a negative code. */
+ * Position limits and the brake do not count. May be called on any thread, also beside a running
+ * loop; takes some milliseconds and allocates. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_analyze(const dashpot_controller* controller, const double* position, int32_t mode,
                         const dashpot_gains* gains, dashpot_closed_loop* loop,
                         dashpot_modes* modes);
@@ -519,11 +517,10 @@ int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* 
 int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes);
 int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes);
 
-/* Returns 1 where, after the last dashpot_update, the host has to end the motion at once and to
- * engage the robot's own brakes, because no torque is known to be right: with DASHPOT_STATE_FROZEN,
+/* Returns 1 if, after the last dashpot_update, the host has to end the motion at once and to engage
+ * the robot's own brakes, because no torque is known to be right: with DASHPOT_STATE_FROZEN,
  * DASHPOT_STATE_CONTRADICTORY or DASHPOT_BRAKE_DOUBTED, and, once the fault has latched, with
- * DASHPOT_STATE_NOT_FINITE and all after it. Returns 0 otherwise. Called on the real-time thread.
- */
+ * DASHPOT_STATE_NOT_FINITE and all after it. Otherwise 0. Called on the real-time thread. */
 int32_t dashpot_needs_brakes(const dashpot_controller* controller);
 
 /* Return a short English text for what a function returned ("torque limited"), and for the kind of

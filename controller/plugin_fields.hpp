@@ -1,5 +1,5 @@
 #pragma once
-// Which field of the C structs of plugin.h is which of the C++ ones, in one place for both ways.
+// Maps the fields of the C structs of plugin.h to the fields of the C++ ones, for both directions.
 
 #include <dashpot/controller/plugin.h>
 #include <dashpot/controller/snapshot.hpp>

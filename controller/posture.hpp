@@ -24,14 +24,15 @@ class PostureSequence {
   JointVector offset_;  ///< in [0, 1)
 };
 
-/// The posture that stands for an arm where none is given: the middle of each joint's position
-/// limits, and 0 where a joint has none; where that is singular, the regular one nearest to it of
-/// 256 spread over the limits.
+/// The posture of an arm for which none is given: the middle of each joint's position limits, and 0
+/// for a joint without limits. If that is singular, it is the regular posture nearest to it of 256
+/// spread over the limits.
 JointVector default_posture(const RobotModel& model);
 
-/// Names the directions in which the tip hardly moves at q (n, rad): those of the singular values
-/// of J below 2 % of the largest, each by its largest parts: "z", "y + 0.40 rx". Empty if the
-/// posture is regular, which an arm of fewer than six joints is with n singular values above that.
+/// Names the directions in which the tip hardly moves at q (n, rad). They belong to the singular
+/// values of J below 2 % of the largest, and each is named by its largest parts: "z", "y + 0.40
+/// rx". Empty if the posture is regular: an arm of fewer than six joints then has n singular values
+/// above that.
 std::string lost_directions(const RobotModel& model, const JointVector& q);
 
 /// One line that names the joint that needs most of its effort limit to hold the arm and its
@@ -39,15 +40,14 @@ std::string lost_directions(const RobotModel& model, const JointVector& q);
 std::string too_heavy(const RobotModel& model, const JointVector& q);
 
 /// One line that names the first joint more than `tolerance` (rad or m) outside its position
-/// limits, and says so if degrees fit where q (n, rad) does not; empty if q is inside.
+/// limits, and says so if q (n, rad) fits in degrees; empty if q is inside.
 std::string outside_limits(const RobotModel& model, const JointVector& q, double tolerance = 1e-3);
 
 /// One line that says why an arm cannot be at rest at q (n, rad): a joint is 0.1 rad (0.1 m) or
-/// more beyond the limits of the model, or, where that has none, a turn beyond those of the
+/// more beyond the limits of the model, or, if the model has none, a turn beyond the limits of the
 /// settings; `weight` (n, N m), which the controller is to compensate, is beyond a torque limit; or
-/// `torque` (n, N m, no entries if it is not known), which acts there, contradicts the weight by
-/// more than 5 % of a torque limit, the joint's Coulomb friction, and Watchdog::start_torque. Empty
-/// if the arm may be there.
+/// the acting `torque` (n, N m, no entries if unknown) contradicts the weight by more than 5 % of a
+/// torque limit, Coulomb friction, and Watchdog::start_torque. Empty if the arm may be there.
 std::string start_fault(const RobotModel& model, const Settings& settings, const JointVector& q,
                         const JointVector& torque, const JointVector& weight);
 

@@ -11,8 +11,8 @@
 
 namespace dashpot::controller {
 
-/// When the torques of a controller act on an arm, and what of the past they count. What is left
-/// out, and what a model does not know, is said by loop_assumptions.
+/// When the torques of a controller act on an arm, and which past states they use. Omitted effects,
+/// and values that a model lacks, are named by loop_assumptions.
 struct LoopTiming {
   double period = 0;  ///< of the control loop, s; zero: the loop is taken for continuous
   int delay = 0;      ///< ticks from a torque to its effect, beyond the hold
@@ -37,7 +37,7 @@ void set_timing(const LoopTiming& timing, Settings& settings);
 analysis::SampledLoop timed(const LoopTiming& timing, analysis::SampledLoop loop);
 
 /// Returns what a closed loop leaves out that an arm may have, as a sum of powers of two, one for
-/// each of assumption_names. In all commands the same. `model` is null where only matrices are
+/// each of assumption_names; it is the same in all commands. `model` is null if only matrices are
 /// known.
 std::uint32_t assumption_bits(const LoopTiming& timing, const RobotModel* model);
 
@@ -50,8 +50,8 @@ inline std::vector<std::string> loop_assumptions(const LoopTiming& timing,
   return assumption_names(assumption_bits(timing, model));
 }
 
-/// Motions slower than this, rad/s, do not count in a gain margin, because a self-motion fed by the
-/// compensation of gravity through a zero-order hold is no vibration.
+/// Motions slower than this, rad/s, do not count in a gain margin: they are self-motions fed by the
+/// compensation of gravity through a zero-order hold, and do not vibrate.
 inline constexpr double kSlowestVibration = 1;
 
 /// Returns dg/dq (n x n, N m/rad) of the gravity torque g(q), by central differences, with a
@@ -74,8 +74,8 @@ JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& imp
 /// None if K_I has no entries.
 analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period);
 
-/// Returns at which rates, 1/s, the slow modes decay that the integral makes, the slowest first;
-/// negative: it grows.
+/// Returns the rates, 1/s, at which the slow modes of the integral decay, the slowest first; a
+/// negative one grows.
 std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period);
 
 /// An arm as a sampled loop has it: all of the loop but the springs and dampers of the controller.
@@ -104,8 +104,8 @@ class SampledArm {
   std::uint32_t assumes_;
 };
 
-/// Returns what designs the damping of springs for their ratios: as much of it as the sampled loop
-/// of the settings, without gravity and gears, bears with Limits::gain_margin and a reserve.
+/// Returns the design of damping for ratios of springs, lowered until the sampled loop of the
+/// settings, without gravity and gears, keeps Limits::gain_margin and a reserve.
 DesignedDamping designed_damping(const RobotModel& model, const Settings& settings);
 
 /// Returns a system whose size is not bounded by the type.
@@ -122,29 +122,29 @@ struct LoopAt {
 double margin_up_to(const analysis::System<kMaxJoints>& system, const analysis::SampledLoop& loop,
                     double enough);
 
-/// The closed loop that gains make at any posture, with the robot at rest there, without a loop
-/// that runs: the matrices that Controller::closed_loop gives once the gains are in force, and how
-/// the settings have it sampled.
+/// The closed loop that gains make at any posture, with the robot at rest there, while no loop
+/// runs: the matrices of Controller::closed_loop once the gains are active, sampled as the settings
+/// say.
 class PostureLoop {
  public:
-  /// Copies the model. The settings have to be valid. Limits, but the gain margin, and of
-  /// `analysis` all but the sampled loop are not looked at.
+  /// Copies the model. The settings have to be valid. Ignores all limits but the gain margin, and
+  /// all of `analysis` but the sampled loop.
   PostureLoop(const RobotModel& model, const Settings& settings);
 
   /// Attaches something else to the tip link.
   void attach(const Attachment& attachment) noexcept { arm_.attach(attachment); }
-  /// Sets `system` to M q'' + C q' + K q = f at the posture `q` (n, rad), in joint coordinates, or
-  /// those of analysis::Gears: mass, damping, stiffness and its factor, as Controller::closed_loop.
-  /// The gains must have passed check_gains in this mode. The springs hold `external_wrench` (6, in
-  /// B's axes, N and N m) there, which matters with TaskTerms::load only. Returns kOk, or, if q or
-  /// the wrench are no state, kStateWrongSize, kStateNotFinite or kWrenchNotFinite, and then leaves
-  /// `system` as it is.
+  /// Sets `system` to M q'' + C q' + K q = f at the posture `q` (n, rad): mass, damping, stiffness
+  /// and its factor, in joint coordinates or in the coordinates of analysis::Gears, as
+  /// Controller::closed_loop. The gains must have passed check_gains in this mode. The springs hold
+  /// `external_wrench` (6, in B's axes, N and N m) there, which matters with TaskTerms::load only.
+  /// Returns kOk, or, for an impossible q or wrench, kStateWrongSize, kStateNotFinite or
+  /// kWrenchNotFinite, and then leaves `system` as it is.
   Status closed_loop(const JointVector& q, const Gains& gains, Mode mode,
                      analysis::System<kMaxJoints>& system,
                      const Vector6& external_wrench = Vector6::Zero());
-  /// Returns how the last closed_loop is sampled, in its coordinates.
+  /// Returns the sampled loop of the last closed_loop, in its coordinates.
   analysis::SampledLoop sampled() const;
-  /// Returns both. Throws std::invalid_argument where closed_loop fails.
+  /// Returns system and sampled loop. Throws std::invalid_argument where closed_loop fails.
   LoopAt at(const JointVector& q, const Gains& gains, Mode mode,
             const Vector6& external_wrench = Vector6::Zero());
   /// Returns what the sampled loop leaves of the ratios of the last closed_loop.

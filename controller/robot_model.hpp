@@ -10,8 +10,8 @@
 
 namespace dashpot::controller {
 
-/// Where an arm with elastic joints measures its joint positions and velocities: what its springs
-/// and dampers act on.
+/// The place where an arm with elastic joints measures its joint positions and velocities, on which
+/// its springs and dampers act.
 enum class PositionSensor : std::uint8_t {
   kMotor,  ///< on the motor's side of the gear, theta
   kLink,   ///< on the link's side, q

@@ -48,7 +48,7 @@ struct Payload {
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass, kg m^2
 };
 
-/// Limits of the tip's speed, below those of the settings; infinity: those of the settings.
+/// Limits of the tip's speed, below the settings' limits; infinity: the limits of the settings.
 struct TipSpeed {
   static constexpr double kLeast = 1e-4;  ///< m/s and rad/s: less is as good as none, or a mistake
   double linear = std::numeric_limits<double>::infinity();   ///< to which references take it, m/s
@@ -75,13 +75,14 @@ enum class Mode : std::uint8_t {
   kCartesian,  ///< to a pose of the tip; a redundant arm also to a posture
 };
 
-/// Through which projector N = I - X J springs and dampers of the null space act, see NullSpace.
+/// The projector N = I - X J through which springs and dampers of the null space act, see
+/// NullSpace.
 enum class NullProjector : std::uint8_t {
   kDynamic,    ///< X = M^-1 J' (J M^-1 J')^-1: nothing that acts there moves the tip
   kKinematic,  ///< X the pseudo-inverse J' (J J')^-1: a tip at rest under no load feels nothing
 };
 
-/// In whose axes K_C, C_C and `directions` are given.
+/// The axes in which K_C, C_C and `directions` are given.
 enum class Frame : std::uint8_t { kBase, kTool };
 
 /// Natural frequency below which a damping ratio means nothing, rad/s, because one swing takes a
@@ -89,7 +90,6 @@ enum class Frame : std::uint8_t { kBase, kTool };
 /// them less than their ratio.
 inline constexpr double kSoftFrequency = 0.1;
 
-/// The largest damping ratio that can be asked for.
 inline constexpr double kLargestDampingRatio = 2;
 
 /// Springs and dampers. All matrices are symmetric positive semidefinite.
@@ -118,7 +118,7 @@ struct Gains {
   double null_damping_ratio = 0;
 };
 
-/// What the user wants. It may change at any tick; the controller moves there smoothly. A set-point
+/// The user's command. It may change at any tick; the controller moves there smoothly. A set-point
 /// is read if its time differs from the time of the last set-point.
 struct Setpoint {
   std::int64_t time = 0;  ///< ns, when it was given, on the clock of RobotState::time

@@ -9,9 +9,9 @@
 
 namespace dashpot::controller {
 
-/// The joints of a model whose reflected inertia was not told. Rotors behind gears often resist a
+/// The joints of a model whose reflected inertia is unknown. Rotors behind gears often resist a
 /// wrist ten times as much as its links do. Without them fast modes and the gain margin are wrong
-/// by as much, where the slow modes hardly change.
+/// by as much, while the slow modes hardly change.
 struct UnknownRotors {
   std::vector<int> joints;            ///< from 0, in order
   const Drives* published = nullptr;  ///< public figures of an arm of this kind; null: none
@@ -19,15 +19,15 @@ struct UnknownRotors {
   bool any() const noexcept { return !joints.empty(); }
 };
 
-/// Returns the joints without reflected inertia. Where links and rotors of a direct drive are one
-/// body, any small reflected inertia says that this is known.
+/// Returns the joints without reflected inertia. If links and rotors of a direct drive are one
+/// body, any small reflected inertia marks it as known.
 UnknownRotors unknown_rotors(const RobotModel& model);
 
 /// Returns the reflected inertia (n, kg m^2) of the joints where it is unknown, zero where none is
-/// needed, with which `keeps` is true of the model: the least of those that give every joint the
+/// needed, with which `keeps` is true of the model: the least inertia that gives every joint the
 /// same share of period * damping + period^2 * stiffness. `loop` is the closed loop of the model as
-/// it is, in joint coordinates. Empty if no inertia is enough, or none is unknown. Calls `keeps`
-/// some twenty times; what it throws counts as false.
+/// it is, in joint coordinates. Empty if no inertia is enough, or all of it is known. Calls `keeps`
+/// some twenty times; an exception counts as false.
 std::optional<JointVector> enough_reflected_inertia(
     const RobotModel& model, const analysis::System<>& loop, double period,
     const std::function<bool(const RobotModel&)>& keeps);

@@ -19,7 +19,7 @@ struct FeedForward {
   bool acceleration = true;  ///< M times the acceleration of the reference
   bool wrench = true;        ///< J' times the wrench of the set-point
 
-  /// At whose velocity friction is compensated.
+  /// The velocity at which friction is compensated.
   enum class FrictionAt : std::uint8_t {
     kReference,  ///< the reference's: it adds no feedback
     kMeasured,   ///< the joints' own: a feedback that takes damping away, see `friction_share`
@@ -33,10 +33,10 @@ struct FeedForward {
   double friction_rise = 0.1;  ///< rad/s (m/s)
 };
 
-/// Integral action: springs that are held away from their reference pull harder and harder. The
-/// joint torques t and the wrench f (at the tip, in B's axes) that it adds grow by
-///     dt/dt = K_q (q_d - q) / time,    df/dt = K_C e / time,
-/// within their bounds. See SpringIntegral for when they stand still, and when they are let go.
+/// Integral action: springs that are held away from their reference pull harder and harder. It adds
+/// joint torques t and a wrench f (at the tip, in B's axes), which grow within their bounds by
+///     dt/dt = K_q (q_d - q) / time,    df/dt = K_C e / time.
+/// SpringIntegral says when they stand still, and when they fade.
 struct Integral {
   double time = 0;  ///< about the time constant of the slow modes that it makes, s; 0: no integral
   double force = 10;   ///< |f| of the force, N
@@ -68,9 +68,9 @@ struct TaskTerms {
   bool jacobian_rate = false;  ///< J' C_C Jdot, in the analysis
 };
 
-/// Springs and dampers that act on the arm beside those of the controller: of a contact, of a
-/// cable, of the drives. They are counted in the modes. Damping that is designed for a ratio and
-/// GainJudge do not know of them. Entries are not negative.
+/// Springs and dampers that act on the arm in addition to the controller's: of a contact, of a
+/// cable, of the drives. They count in the modes. GainJudge and the design of damping for a ratio
+/// ignore them. Entries are not negative.
 struct Environment {
   Vector6 tip_stiffness = Vector6::Zero();  ///< in B's axes, N/m, N m/rad
   Vector6 tip_damping = Vector6::Zero();    ///< N s/m, N m s/rad
@@ -116,13 +116,13 @@ struct Limits {
   double tip_velocity = 1.5;   ///< of the tip's origin, m/s, positive
   JointVector position_lower;  ///< n, rad; -infinity if there is none
   JointVector position_upper;  ///< n, rad; infinity if there is none
-  /// Time constant with which the brake stops the arm, s: at a fault, and, five times as fast, what
-  /// would take a joint beyond its limits of velocity and position. It is longer where the sampled
-  /// loop bears no harder brake. See Brake.
+  /// Time constant with which the brake stops the arm, s: at a fault, and, five times as fast,
+  /// before a joint exceeds its limits of velocity and position. It is longer if the sampled loop
+  /// does not tolerate such a hard brake. See Brake.
   double stopping_time = 0.05;
   /// Error clamp: the Cartesian springs are extended no further than this, m and rad, however far
   /// away the goal is. Beyond it they pull no harder, and the reference waits for the robot (see
-  /// TipReference). A reference that is to brake within the clamp is no faster than
+  /// TipReference). So that it can brake within the clamp, a reference moves at most with
   /// sqrt(acceleration * clamp).
   double linear_error = 0.3;
   double angular_error = 1.0;
@@ -137,7 +137,7 @@ struct Limits {
   std::vector<Wall> walls;  ///< at most kMaxWalls
   /// Hosts refuse gains with which the sampled loop would be unstable, or would become so with all
   /// gains multiplied by a factor of up to this; 1 accepts all gains. See GainJudge. Controller
-  /// itself takes any gains, and lowers damping ratios where the loop does not bear them with this
+  /// itself takes any gains, and lowers damping ratios with which the loop does not keep this
   /// margin; 1 lowers none. See DesignedDamping.
   double gain_margin = 2;
   /// Whether settings beyond the model's limits, and lengths, angles and times that no arm needs,
@@ -153,8 +153,8 @@ struct Watchdog {
   double setpoint_damp = 2.0;  ///< age from which on the output is damp, s; 0: never
   double longest_gap = 0.01;   ///< longest time between two good states, s; a longer gap is a fault
   /// Time over which states are checked against each other, s; 0: no check. Positions are compared
-  /// with velocities over about this time. Whether states change at all is checked over two fifths
-  /// of it.
+  /// with velocities over about this time. A state that does not change at all is noticed after two
+  /// fifths of it.
   double feedback = 0.5;
   /// The torque that acts at the start may differ from the weight by this share of the weight's
   /// largest entry, beside friction; infinity: by any amount. See start_fault.
@@ -173,10 +173,10 @@ struct Analysis {
   /// Share of a period that the analysis within a tick may take, above 0 and at most 1. A task that
   /// needs more continues on a thread of its own, and the status is analysis::Status::kUnfinished
   /// meanwhile. Work is counted, not timed: kWorkPerSecond units of analysis::Work are a second to
-  /// 15 %, by ./run bench: 4.80 us for a tick of 7 joints with 104,559 instructions. So that
-  /// ticks are even, the work is at most kEvenWork (n / 7)^3 share / 10 % for n joints, the work of
-  /// about ten ticks in which modes are followed; for fewer than 7 joints it is that of 7. An
-  /// elastic joint counts as two.
+  /// 15 %, by ./run bench: 4.80 us for a tick of 7 joints with 104,559 instructions. So that ticks
+  /// are even, the work is at most kEvenWork (n / 7)^3 share / 10 % for n joints, the work of about
+  /// ten ticks in which modes are tracked; fewer than 7 joints get the bound of 7. An elastic joint
+  /// counts as two.
   double share = 0.1;
   static constexpr double kWorkPerSecond = 2.5e10;
   static constexpr double kEvenWork = 1e6;

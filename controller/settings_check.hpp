@@ -28,11 +28,11 @@ class InvalidSettings : public std::invalid_argument {
 /// in seconds; what it says names the likely unit.
 void validate(const Settings& settings, const RobotModel& model);
 
-/// Lines that ask about gains: whether the rotations of the task's stiffness or damping stand
-/// first, where a tip on a lever of twice the arm's reach would turn harder than it moves, and
-/// whether a damping is ratios, where no number is above 2 and the largest, at the tip against
-/// translation, leaves a mass or an inertia of 1 a ratio below 0.1. Joints that turn with
-/// less than 100 N m/rad are not asked about.
+/// Returns lines that ask about gains: whether the rotations of the task's stiffness or damping
+/// stand first, if a tip on a lever of twice the arm's reach would turn harder than it moves; and
+/// whether a damping holds ratios, if no number is above 2 and the largest, at the tip against
+/// translation, leaves a mass or an inertia of 1 a ratio below 0.1. Ignores joints that turn with
+/// less than 100 N m/rad.
 std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& gains);
 /// Asks the same about an arm of known reach, m; without `joints` all joints are taken to turn.
 std::vector<std::string> doubtful_gains(double reach, const Gains& gains,
@@ -47,7 +47,7 @@ struct Stopping {
   JointVector way;   ///< n, rad, m for prismatic joints, that the joint goes in this time
 };
 
-/// Finds that at q (n, rad), with the limits, period and delay of `settings`. Takes about a
+/// Computes this at q (n, rad), with the limits, period and delay of `settings`. Takes about a
 /// millisecond a joint.
 Stopping stopping(const RobotModel& model, const Settings& settings, const JointVector& q);
 

@@ -9,7 +9,7 @@
 namespace dashpot::controller {
 
 /// What one tick measured and put out: plain data to copy to another thread. With a status whose
-/// safe output is "ramp", position and velocity are the measured ones where they are numbers, and
+/// safe output is "ramp", position and velocity are the measured ones if they are numbers, and
 /// everything computed from them belongs to the last good state.
 struct Snapshot {
   std::int64_t time = 0;       ///< ns, of the state
@@ -17,7 +17,7 @@ struct Snapshot {
   std::uint64_t restarts = 0;  ///< how often the springs restarted, the first time included
   Status status = Status::kOk;
   Status fault = Status::kOk;      ///< the latched fault; kOk: none
-  Mode mode = Mode::kJoint;        ///< of the set-point in force
+  Mode mode = Mode::kJoint;        ///< of the current set-point
   double joint_weight = 0;         ///< share of the joint springs, 0 to 1
   double task_weight = 0;          ///< share of the Cartesian springs, 0 to 1
   JointVector position;            ///< q, n, rad
@@ -30,7 +30,7 @@ struct Snapshot {
   JointVector reference_velocity;  ///< n, rad/s
   Pose tip;                        ///< p_BT_B, R_BT
   Pose reference_tip;  ///< where the Cartesian springs are fixed at this tick; the tip's
-                       ///< own pose while no such spring is in force
+                       ///< own pose while no such spring is active
   Vector6 reference_twist = Vector6::Zero();  ///< velocity of reference_tip, m/s and rad/s
   JointVector joint_error;                    ///< reference_position - position, n, rad
   Vector6 tip_error = Vector6::Zero();   ///< from tip to reference: m, and rotation vector, rad
@@ -39,19 +39,19 @@ struct Snapshot {
   /// What the integral of the springs has stored: t (n, N m) and f, see Integral.
   JointVector integral_torque;
   Vector6 integral_wrench = Vector6::Zero();
-  /// Damping ratios that the damping of the springs in force is designed for; 0: it is given.
+  /// Damping ratios for which the damping of the active springs is designed; 0: it is given.
   double joint_damping_ratio = 0, task_damping_ratio = 0;
-  /// Share of its ratio that the mode has that the sampled loop leaves least, of the ratios above
-  /// and of the null space's: above 0, and 1 where the loop bears all of them.
+  /// Smallest share of its damping ratio that the sampled loop leaves a mode, of the ratios above
+  /// and of the null space's: above 0, and 1 if the loop keeps its margin with all ratios.
   double damping_level = 1;
   double energy_store = std::numeric_limits<double>::infinity();  ///< S of EnergyTank, J; infinite
                                                                   ///< without a tank
   double spring_share = 1;  ///< of the springs' torque that the energy in the tank allows
-  Payload payload;  ///< in force at this tick, on the way to what Controller::attach was given
-  Pose tool;        ///< likewise: T in the tip link
+  Payload payload;          ///< at this tick, on its way to the argument of Controller::attach
+  Pose tool;                ///< likewise: T in the tip link
 };
 
-/// One vibration mode of the closed loop; the terms are those of analysis::Mode.
+/// One vibration mode of the closed loop; analysis::Mode explains the terms.
 struct VibrationMode {
   /// Number of the mode, which it keeps as long as it can be followed. No other mode has this
   /// number meanwhile.
@@ -99,8 +99,8 @@ struct Vibration {
   std::int64_t work = 0;  ///< done within the last tick, in units of analysis::Work
 };
 
-/// A mode of the continuous loop, and the same mode in the sampled loop; the terms are those of
-/// analysis::SampledMode.
+/// A mode of the continuous loop, and the same mode in the sampled loop; analysis::SampledMode
+/// explains the terms.
 struct SampledVibrationMode {
   analysis::ModeKind kind = analysis::ModeKind::kUnderdamped;
   double continuous_frequency = 0;  ///< natural frequency of the continuous loop, rad/s

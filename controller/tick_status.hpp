@@ -8,10 +8,9 @@ namespace dashpot::controller {
 ///   hold:  the springs stop where they are, whatever the set-point says; no commanded wrench.
 ///   damp:  no springs: the brake (see Brake), which holds the arm once it stands, and the arm's
 ///          weight where the controller compensates it.
-///   ramp:  the last torque for Watchdog::longest_gap; then the last known weight, with a brake
-///   that
-///          goes by what the model says of the last good state; after 2 s the torque goes to zero
-///          within 0.1 s. Before the first good state it stays what it was for these 2 s.
+///   ramp:  the last torque for Watchdog::longest_gap; then the last known weight, with a brake for
+///          the motion that the model predicts from the last good state; after 2 s the torque goes
+///          to zero within 0.1 s. Before the first good state it stays constant for these 2 s.
 /// Torque and torque-rate limits hold for all of them. Where damp and ramp take torque away, it
 /// fades evenly: in all joints alike, as slowly as the slowest torque-rate limit makes it.
 ///
@@ -32,10 +31,10 @@ enum class Status : std::uint8_t {
   kLittleMargin,      ///< springs too stiff for the sampled loop, or a damping ratio too small for
                       ///< them: no share of the ratio keeps Limits::gain_margin at this posture
   kWrenchNotFinite,   ///< NaN or infinity in RobotState::external_wrench; the last finite wrench
-                      ///< stays in force in the analysis. With Limits::external_force: kCollision
-  kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a matrix that is no
-                      ///< rotation, a goal beyond a limit or wall, or a time further ahead than
-                      ///< the first time-out; the last good set-point stays in force
+                      ///< stays in the analysis. With Limits::external_force: kCollision
+  kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, an invalid rotation
+                      ///< matrix, a goal beyond a limit or wall, or a time further ahead than the
+                      ///< first time-out; the last good set-point stays
   kWeightNotHeld,     ///< the weight of the arm needs more than a torque limit: the arm sinks
   // The set-point is too old:
   kSetpointStale,  ///< older than the first time-out: hold
@@ -54,8 +53,8 @@ enum class Status : std::uint8_t {
   kStateFrozen,         ///< the state does not change at all, though the torque does or the
                         ///< velocity is not zero: weight alone
   kStateContradictory,  ///< positions do not move as the velocities say
-  kTimeBackward,        ///< time stamps at or before that of the last tick; they count as a period.
-                        ///< For at most Watchdog::longest_gap this changes no torque
+  kTimeBackward,        ///< a time stamp not after the last one; it counts as a period. For at
+                        ///< most Watchdog::longest_gap this changes no torque
   kBrakeDoubted,  ///< the brake alone acts, and the arm gets faster or vibrates: weight alone.
                   ///< The robot needs its own brakes
   // The state cannot be trusted: ramp:
@@ -76,8 +75,8 @@ inline bool latches(Status status) noexcept {
   return status > Status::kFaultLatched && status < Status::kStateNotFinite;
 }
 
-/// Returns true if a tick's status, with the fault that is latched, asks for the robot's brakes: no
-/// torque is known to be right, or the state is lost for so long that a fault has latched.
+/// Returns true if a tick's status, with the latched fault, requires the robot's brakes: no torque
+/// is known to be right, or the state is lost for so long that a fault has latched.
 inline bool needs_brakes(Status status, Status fault) noexcept {
   return status == Status::kStateFrozen || status == Status::kStateContradictory ||
          status == Status::kBrakeDoubted ||

@@ -23,10 +23,10 @@ using Eigen::MatrixXd;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// A real part of this share of the fastest eigenvalue cannot be told from zero.
+/// A real part below this share of the fastest eigenvalue counts as zero.
 constexpr double kRounding = 1e-12;
 
-/// A number and how far it is from the true one at most.
+/// A number with a bound of its error.
 struct Bounded {
   double value = kNan, bound = 0;
 };
@@ -70,8 +70,7 @@ void read_spectrum(const analysis::Spectrum<>& spectrum, PostureAudit& result) {
 }
 
 /// Sets smallest ratio and fastest pole from eigenvalues of a loop whose springs are stiff in all
-/// directions. Returns false if they do not tell the ratio: modes of real eigenvalues need to be
-/// paired.
+/// directions. Returns false if real eigenvalues have to be paired before the ratio is known.
 bool read_eigenvalues(const Eigen::Ref<const Eigen::VectorXcd>& values, double soft_frequency,
                       PostureNumbers& result) {
   double ratio = kInfinity, fastest = kInfinity, slowest = -kInfinity;
@@ -126,7 +125,7 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
   if (options.upper.size() == 0) options_.upper = model.joint_values(&Joint::upper);
   require(options_.lower.size() == n && options_.upper.size() == n &&
               (options_.lower.array() <= options_.upper.array()).all(),
-          "lower, upper: need n entries, none of lower above that of upper");
+          "lower, upper: need n entries, with each lower one at most the upper one");
   designed_ = designing_settings(model, options);
 }
 
@@ -188,7 +187,7 @@ std::optional<PostureNumbers> Audit::numbers(const LoopAt& loop) const {
   system.mass = loop.system.mass;
   system.damping = loop.system.damping;
   system.stiffness_factor.resize(W.rows(), W.cols());
-  Index rows = 0;  // without those of springs that are zero, such as a null space's
+  Index rows = 0;  // without the rows of zero springs, such as a null space's
   for (const auto& row : W.rowwise()) {
     if (!row.isZero(0)) system.stiffness_factor.row(rows++) = row;
   }

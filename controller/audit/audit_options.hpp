@@ -8,10 +8,10 @@ namespace dashpot::controller {
 /// Without a period no gain margin is computed, and in it alone an integral counts.
 struct AuditOptions : LoopTiming {
   Mode mode = Mode::kCartesian;  ///< which of the gains act
-  /// Stiffness and damping as stated. `directions` in it are not read: a direction of the task
+  /// Stiffness and damping as stated. `directions` in it is ignored: a direction of the task
   /// without stiffness and damping is free. Joint matrices and null-space vectors without entries
-  /// count as zero. With a ratio the damping is designed at each posture as Controller does, as
-  /// much as the loop leaves of it with `margin`.
+  /// count as zero. With a ratio the damping is designed at each posture as Controller does,
+  /// lowered so that the loop keeps `margin`.
   Gains gains;
   /// True if the controller takes the vector part of the error's quaternion, which is half of the
   /// rotation vector, for its rotational error. The springs then act with half of the stated
@@ -23,7 +23,7 @@ struct AuditOptions : LoopTiming {
   /// has one number for the three translations and one for the three rotations.
   bool inertia_blocks = false;
   double margin = 2;  ///< gain margin that is asked for, see PostureAudit::rotors; at least 1
-  /// Through which the null space's springs and dampers act. Many controllers have the kinematic
+  /// The projector of the null space's springs and dampers. Many controllers have the kinematic
   /// one.
   NullProjector null_projector = NullProjector::kDynamic;
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s

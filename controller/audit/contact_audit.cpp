@@ -15,7 +15,7 @@ using analysis::Touch;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-/// A loop at a posture that the tip touches something with.
+/// The loop at a posture whose tip touches something.
 class TouchingTip {
  public:
   TouchingTip(const Audit& audit, const JointVector& q, const ContactOptions& options)
@@ -39,7 +39,7 @@ class TouchingTip {
   const LoopAt& loop() const { return loop_; }
   const analysis::Spectrum<>& spectrum() const { return spectrum_; }
 
-  /// Whether the tip gives way in a direction, to a force at the tip.
+  /// Returns true if a force at the tip moves it in a direction.
   bool moves(const Vector3d& n) const {
     constexpr double kStuck = 1e-6;  // of the mobility in the three axes together
     return n.dot(mobility_ * n) > kStuck * mobility_.trace();
@@ -105,8 +105,8 @@ void refine(const TouchingTip& tip, ContactAt& best) {
   }
 }
 
-/// Returns the force in a direction at which a joint is at its limit, and what the springs, whose
-/// compliance is C' = a' K^+ a there, are pressed in by it.
+/// Returns the force in a direction at which the first joint reaches its limit, and by how much it
+/// compresses the springs, whose compliance there is C' = a' K^+ a.
 HeldForce held_force(const TouchingTip& tip, const JointVector& weight, const JointVector& effort,
                      const Vector3d& n) {
   HeldForce result{n, std::numeric_limits<double>::infinity(), -1, 0};

@@ -17,8 +17,8 @@ Settings judging(Settings settings) {
   return settings;
 }
 
-/// Whether the payload has a part in the damping. In motions that leave the tip where it is, it has
-/// none.
+/// Returns true if the payload adds to the damping. It does not in motions that leave the tip at
+/// rest.
 bool counts_payload(const Gains& gains, Mode mode) noexcept {
   if (mode == Mode::kJoint) return gains.joint_damping_ratio > 0;
   const auto& held = gains.directions;

@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 
 constexpr double kUnpaired = std::numeric_limits<double>::quiet_NaN();
 
-/// The largest likeness |u^H M v| of two modes' shapes, at most 1.
+/// The largest similarity |u^H M v| of two modes' shapes, at most 1.
 double likeness(const MatrixXd& mass, const analysis::Mode<>& a, const analysis::Mode<>& b) {
   double largest = 0;
   for (const auto& u : a.shapes) {
@@ -26,8 +26,8 @@ double likeness(const MatrixXd& mass, const analysis::Mode<>& a, const analysis:
   return largest;
 }
 
-/// The damping ratios of the modes `with` where those of `without` stand whose shapes are most
-/// alike, the likest pair first; NaN where none is left.
+/// The damping ratios of the modes `with`, in the order of the modes `without` with the most
+/// similar shapes, the most similar pair first; NaN if no mode remains.
 Eigen::VectorXd paired_ratios(const MatrixXd& mass, const analysis::Spectrum<>& without,
                               const analysis::Spectrum<>& with) {
   MatrixXd alike(without.modes.size(), with.modes.size());

@@ -13,7 +13,7 @@ void require(bool condition, const std::string& message);
 /// is positive semidefinite.
 int checked_rank(const std::string& name, const Eigen::MatrixXd& stiffness);
 
-/// Returns the springs and dampers as stated, in force, for n joints. Throws std::invalid_argument,
+/// Returns the active springs and dampers as stated, for n joints. Throws std::invalid_argument,
 /// with the member's name and the reason.
 Impedance stated_impedance(const AuditOptions& stated, int n);
 

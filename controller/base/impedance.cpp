@@ -3,7 +3,7 @@
 namespace dashpot::controller {
 namespace {
 
-/// The dampers C where the stiffness K has no springs: rows and columns of the others are zero.
+/// The dampers C in the directions in which the stiffness K has no springs.
 template <class Matrix>
 Matrix beside_springs(const Matrix& K, const Matrix& C) noexcept {
   Matrix result = C;

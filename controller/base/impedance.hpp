@@ -13,7 +13,7 @@ struct TipImpedance {
   bool none() const noexcept { return (selected.array() == 0).all(); }
 };
 
-/// Springs and dampers of every mode and frame at once; springs and dampers not in force are zero.
+/// Springs and dampers of every mode and frame at once; inactive springs and dampers are zero.
 /// Weighted means of two impedances are impedances, and their matrices stay positive semidefinite.
 struct Impedance {
   double joint_weight = 0;         ///< share of the joint springs
@@ -37,7 +37,7 @@ struct Impedance {
   /// in the null space if all its stiffness is zero.
   Impedance(const Setpoint& setpoint, int n) noexcept;
 
-  /// Returns the share of the Cartesian springs in all springs in force, 1 if there are no others.
+  /// Returns the share of the Cartesian springs in all active springs, 1 if there are no others.
   double task_share() const noexcept { return task_weight / (task_weight + joint_weight); }
   /// Returns true if there are springs or dampers in the null space.
   bool null_space() const noexcept;

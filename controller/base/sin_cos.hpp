@@ -12,8 +12,8 @@ namespace dashpot::controller {
 /// NaN.
 ///
 /// The angle is reduced to r = angle - k pi/2, |r| <= pi/4. pi/2 is split into parts of 33 bits, so
-/// that k times a part is exact up to |k| = 2^20. The polynomials in r are those of fdlibm
-/// (k_sin.c, k_cos.c).
+/// that k times a part is exact up to |k| = 2^20. The polynomials in r come from fdlibm (k_sin.c,
+/// k_cos.c).
 inline void sin_cos(const Vec4d& angle, Vec4d& sine, Vec4d& cosine) noexcept {
   using Bits = std::int64_t __attribute__((vector_size(32)));
   constexpr double kLargest = 1e6;

@@ -22,7 +22,7 @@ void SmallCholesky::compute(const Eigen::Ref<const Eigen::MatrixXd>& A,
     for (int j = k + 1; j < n_; ++j) {
       double* const L_j = column(j);
       const double factor = L_k[j];
-      // What stands above the diagonal and below the last row means nothing.
+      // Entries above the diagonal and below the last row have no meaning.
       for (int i = j / 4 * 4; i < n_; i += 4) {
         store(load(L_j + i) - factor * load(L_k + i), L_j + i);
       }

@@ -8,10 +8,9 @@ namespace dashpot::controller {
 namespace {
 
 constexpr int kMostSweeps = 12;
-/// Entries beside the diagonal below this share of the largest entry are rounding.
+/// Off-diagonal entries below this share of the largest entry are rounding errors.
 constexpr double kNothing = 1e-15;
-/// Eigenvalues below this share of it are rounding, whose root would be a hundred million times as
-/// large.
+/// Eigenvalues below this share of it are rounding errors; their roots would be 1e8 times as large.
 constexpr double kVanishes = 1e-13;
 
 /// Turns rows a and b by the angle of c and s.

@@ -10,9 +10,9 @@ struct SymmetricRoot {
 };
 
 /// Returns the root of a symmetric A (n x n), of which the lower triangle is read. Eigenvalues
-/// below 1e-13 of the largest entry count as zero, because rounding makes them of those that
-/// vanish. Jacobi rotations in at most 12 sweeps, so that the work is bounded; the root of a finite
-/// A is finite.
+/// below 1e-13 of the largest entry count as zero, because they may be rounding errors of zeros.
+/// Jacobi rotations in at most 12 sweeps, so that the work is bounded; the root of a finite A is
+/// finite.
 SymmetricRoot symmetric_root(const JointMatrix& A) noexcept;
 
 }  // namespace dashpot::controller

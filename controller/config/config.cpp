@@ -11,13 +11,14 @@
 namespace dashpot::controller {
 namespace {
 
-/// Returns what stands before the last dot of a key, and what stands behind it.
+/// Returns the parts of a key before and after its last dot.
 std::pair<std::string, std::string_view> split(std::string_view key) {
   const std::size_t dot = key.rfind('.');
   return {std::string(key.substr(0, dot)), key.substr(dot + 1)};
 }
 
-/// The keys in a section such as "limits" or "analysis.sampled": those of the table, and two more.
+/// The keys in a section such as "limits" or "analysis.sampled", from the table and `rate`,
+/// `walls`.
 std::vector<std::string_view> keys_of(std::string_view section) {
   std::vector<std::string_view> keys;
   if (section == "control") keys.emplace_back("rate");
@@ -127,8 +128,8 @@ class SettingsReader {
   std::map<std::string, text::YamlMapping> sections_;
 };
 
-/// The line of the value under a key such as "limits.torque"; if it is not there, of what is
-/// nearest above it, unless it has to be `exactly` there; 0 if nothing is.
+/// The line of the value under a key such as "limits.torque". If the key is missing, the line of
+/// the nearest key above it, or 0 if it has to be `exactly` there.
 int line_of(const text::YamlNode& root, const std::string& key, bool exactly = false) {
   const text::YamlNode* node = &root;
   int line = 0;
@@ -225,8 +226,7 @@ void check(const Settings& settings, const RobotModel& model, const text::YamlNo
   }
 }
 
-/// Names gains that do nothing in the mode in which the controller begins, and may be all that was
-/// meant.
+/// Names gains that do nothing in the initial mode, and may have been meant for it.
 std::vector<std::string> unused(const text::YamlNode& document, Mode mode) {
   const bool joint = mode == Mode::kJoint;
   const std::string used = joint ? "gains.joint" : "gains.task";

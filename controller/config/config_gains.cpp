@@ -9,8 +9,8 @@ text::Units task_units(const char* linear, const char* angular) {
   return {linear, linear, linear, angular, angular, angular};
 }
 
-/// Damping that suits a default stiffness suits no other, so the two come together; a damping ratio
-/// suits any.
+/// Damping suits only its own stiffness, so that both are required together; a damping ratio suits
+/// any.
 void require_pair(const text::YamlMapping& keys) {
   for (const auto& [key, other] : {std::pair("stiffness", "damping"), {"damping", "stiffness"}}) {
     if (keys.has(key) && !keys.has(other) && !keys.has("damping_ratio")) {
@@ -19,12 +19,12 @@ void require_pair(const text::YamlMapping& keys) {
   }
 }
 
-/// Reads `damping_ratio`: it and `damping`, which was read before, end each other.
+/// Reads `damping_ratio`, which excludes `damping`, read before.
 void read_ratio(const text::YamlMapping& keys, double& ratio) {
   if (keys.has("damping")) ratio = 0;
   if (!keys.has("damping_ratio")) return;
   if (keys.has("damping")) {
-    throw keys.error("damping_ratio", "stands beside damping, in place of which it is meant");
+    throw keys.error("damping_ratio", "stands beside damping; give only one of them");
   }
   read_number(keys, "damping_ratio", "", {0, false, kLargestDampingRatio}, ratio);
 }

@@ -66,7 +66,7 @@ void read_joint_option(const text::YamlMapping& robot, std::string_view key,
   read_numbers(robot, key, units, range, option, none);
 }
 
-/// What is told of gears that bend, and of torque controllers inside the drives.
+/// Reads the options of elastic joints, and of torque controllers inside the drives.
 void read_gears(const text::YamlMapping& keys, const RobotModel& model, ModelOptions& options) {
   read_joint_option(keys, "torque_loop_inertia_ratio", joint_units(model, "", ""),
                     options.torque_loop_inertia_ratio, text::Range{0, false, 1});
@@ -87,7 +87,7 @@ void read_gears(const text::YamlMapping& keys, const RobotModel& model, ModelOpt
               options.position_sensor);
 }
 
-/// Takes the drives that the keys name into `robot`, and returns its model.
+/// Stores the drives that the keys name in `robot`, and returns its model.
 RobotModel read_drives(const text::YamlMapping& keys, const std::filesystem::path& directory,
                        RobotDescription& robot) {
   read_switch(keys, "drives_friction", robot.options.drives_friction);
@@ -161,7 +161,7 @@ RobotDescription read_robot(const text::YamlMapping& root, const std::filesystem
   read_payload(keys, options.payload);
   read_tool(keys, options.tool);
 
-  // What the joints are is known once there is a model; some inertia makes any model possible.
+  // The kinds of the joints are known once there is a model; some inertia makes any model possible.
   RobotDescription preliminary = robot;
   const text::YamlNode* inertia = keys.find("reflected_inertia");
   if (inertia != nullptr && inertia->items.size() <= kMaxJoints) {

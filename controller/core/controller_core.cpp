@@ -91,7 +91,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   const double age = state_check_.age(), longest_gap = settings_.watchdog.longest_gap;
   if (input >= Status::kStateNotFinite) {
     if (state.position.size() == n_ && state.position.allFinite()) {
-      snapshot_.position = state.position;  // all else stays that of the last good state
+      snapshot_.position = state.position;  // the rest stays as in the last good state
     }
     if (state.velocity.size() == n_ && state.velocity.allFinite()) {
       snapshot_.velocity = state.velocity;
@@ -137,7 +137,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   // Watch the motion.
   const bool odd_stamp = input == Status::kTimeBackward && state_check_.backward() <= longest_gap;
   Status seen = odd_stamp ? Status::kOk : input;  // a stamp or two that say nothing
-  // A reflex that has lost its sensor protects nobody.
+  // Without the wrench, Limits::external_force protects no one.
   const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
   if (blind) seen = worse(seen, Status::kCollision);
   const bool brakes = aim_ != Aim::kSprings;
@@ -148,7 +148,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
 
   // Ask the law, or leave it to the brake.
   const bool hold = status == Status::kSetpointStale;
-  const SmallCholesky* factor = nullptr;  // of M, where somebody has it
+  const SmallCholesky* factor = nullptr;  // of M, if it is known
   if (status < Status::kSetpointLost) {
     if (aim_ != Aim::kSprings) restart_springs();
     setpoints_.step(hold);

@@ -10,8 +10,8 @@
 
 namespace dashpot::controller {
 
-/// Implementation of Controller: the stages of a tick, which `update` calls one after the other and
-/// passes their results on. No stage knows another.
+/// Implementation of Controller: `update` calls the stages of a tick one after the other and passes
+/// their results on. No stage knows another.
 class ControllerCore {
  public:
   /// The settings must be valid.
@@ -38,18 +38,18 @@ class ControllerCore {
 
   /// Starts the springs where the robot is, with gains that grow from zero.
   void restart_springs() noexcept;
-  /// No state could be trusted for a time `lost`, s: the last torque, the brake by what the model
-  /// says with the last known weight, and at last a ramp.
+  /// Acts while the state has not been trusted for a time `lost`, s: the last torque, then the
+  /// brake for the predicted motion with the last known weight, and at last a ramp.
   void go_blind(double lost, JointVector& torque) noexcept;
-  /// No springs act from now on.
+  /// Ends the action of the springs.
   void brake() noexcept;
-  /// Springs restart when they are next in force.
+  /// Makes the springs restart when they act next.
   void forget_springs() noexcept;
-  /// Shows the tick.
+  /// Copies the tick to the snapshot.
   void show() noexcept;
   Status finish(Status status, const JointVector& torque) noexcept;
 
-  /// True if the last torque was that of springs that go on.
+  /// True if springs gave the last torque and may continue.
   bool in_force() const noexcept { return aim_ == Aim::kSprings && faults_.fault() == Status::kOk; }
   LoopAnalysis::Loop loop() const noexcept;
 
@@ -69,16 +69,16 @@ class ControllerCore {
   SafetyFilter filter_;
   LoopAnalysis analysis_;
   const JointVector viscous_friction_;  ///< of the robot, N m s/rad
-  const JointVector friction_left_;     ///< by what compensates it; may be negative
+  const JointVector friction_left_;     ///< after compensation; may be negative
 
   // What the last tick left:
   Sensed sensed_;
   Aim aim_ = Aim::kStop;
-  bool given_ = false;  ///< the torque that acted at the start
+  bool given_ = false;  ///< the torque at the start is known
   LawTorque asked_;
   analysis::DampingLevel level_;  ///< of the ratios
   Impedance brake_;               ///< damping of the brake that acts where no springs do
-  std::uint64_t integrated_ = 0;  ///< changes of set-points that the integral knows of
+  std::uint64_t integrated_ = 0;  ///< changes of set-points that the integral has seen
   Snapshot snapshot_;
 };
 

@@ -15,7 +15,7 @@ void Faults::reset() noexcept {
 
 Status Faults::watch(Status seen, const Sensed& now, bool still, Brake* brake) noexcept {
   restarts_ = std::max(0.0, restarts_ - now.dt);
-  // A motion that nobody saw, or whose velocities are others now, has gained nothing.
+  // A motion that was not observed, or whose velocities have another source now, gained no energy.
   const bool brakes =
       brake != nullptr && seen == Status::kOk && now.dt <= settings_.watchdog.longest_gap;
   Status found = worse(seen, motion_watch_.check({now.dt, now.q, now.qd, now.robot,
@@ -41,9 +41,9 @@ void Faults::applied(Status status, const Sensed& now, double lost,
 }
 
 Faults::Aim Faults::aim() const noexcept {
-  const bool means_nothing = motion_watch_.sees_frozen();  // the velocity
+  const bool means_nothing = motion_watch_.sees_frozen();  // a frozen velocity
   if (means_nothing || fault_ == Status::kBrakeDoubted) return Aim::kFloat;
-  // Elsewhere positions may be wrong, or something is in the way.
+  // For other faults positions may be wrong, or an obstacle may be in the way.
   const bool returns = fault_ == Status::kPositionLimit || fault_ == Status::kVelocityLimit ||
                        fault_ == Status::kTipSpeedLimit;
   return returns ? Aim::kReturn : Aim::kStop;
@@ -52,7 +52,7 @@ Faults::Aim Faults::aim() const noexcept {
 void Faults::latch(Status fault) noexcept {
   if (fault_ != Status::kOk) return;
   fault_ = fault;
-  motion_watch_.forget_swings();  // those that come from now on are the brake's
+  motion_watch_.forget_swings();  // later ones are caused by the brake
 }
 
 bool Faults::rested(const Sensed& now) noexcept {
@@ -71,7 +71,7 @@ bool Faults::brake_fails(Status found, Brake* brake) noexcept {
   if (found == Status::kBrakeDoubted || brake->feeds()) return true;
   if (fault_ == Status::kOk || found != Status::kInstability) return false;
   motion_watch_.forget_swings();
-  const bool softer = brake->soften();  // it shakes the arm: as soft as can be
+  const bool softer = brake->soften();  // it shakes the arm: make it as soft as possible
   while (brake->soften()) continue;
   return !softer;
 }

@@ -5,8 +5,8 @@
 
 namespace dashpot::controller {
 
-/// Latches what the arm must not go on with, and releases it. Whoever latched first is the fault,
-/// until the brake is doubted.
+/// Latches conditions with which the arm must not continue, and releases them. The first one stays
+/// the fault until the brake is doubted.
 class Faults {
  public:
   using Aim = SafetyFilter::Aim;
@@ -19,14 +19,14 @@ class Faults {
     rest_ = 0;
   }
 
-  /// A tick with a good state: `seen` is what its check says. `still`: the references are at rest;
-  /// `brake`: null unless it acts alone; it becomes softer if it shakes the arm. Returns kOk if the
-  /// state allows springs, or kFaultLatched or worse.
+  /// Checks a tick with a good state: `seen` is the status of its check. `still`: the references
+  /// are at rest; `brake`: null unless it acts alone; it becomes softer if it shakes the arm.
+  /// Returns kOk if the state allows springs, or kFaultLatched or worse.
   Status watch(Status seen, const Sensed& now, bool still, Brake* brake) noexcept;
-  /// The torque of a tick, and its status. Blindness latches if it lasts, or where there has been
-  /// no good state for a time `lost` that is too long, s.
+  /// Records the torque of a tick, and its status. Lost states latch a fault after too long, also
+  /// if there has been no good state for a time `lost` that is too long, s.
   void applied(Status status, const Sensed& now, double lost, const JointVector& torque) noexcept;
-  /// Springs restart, not for the first time.
+  /// Counts a restart of the springs, other than the first.
   void count_restart() noexcept { ++restarts_; }
 
   /// Returns the fault that latched, or kOk.

@@ -11,9 +11,9 @@ namespace dashpot::controller {
 namespace {
 
 constexpr double kMargin = 2;      // of gain: a brake leaves a gear's mode half of its damping
-constexpr double kEdge = 0.2;      // times the brake's T: as hard the edges of velocities may be
-constexpr double kLongest = 1e3;   // s: there is none
-constexpr double kSearched = 1e3;  // times: how far down a boundary is looked for
+constexpr double kEdge = 0.2;      // times the brake's T: edges of velocity intervals are this hard
+constexpr double kLongest = 1e3;   // s: no T is stable
+constexpr double kSearched = 1e3;  // times: range of the search for a boundary
 constexpr int kPostures = 16;
 
 }  // namespace
@@ -42,10 +42,10 @@ double gears_stopping_time(const RobotModel& model, const Settings& settings, do
   const std::string gears_keys = "(robot.gear_stiffness, gear_damping, position_sensor)";
   throw InvalidSettings("limits.stopping_time",
                         "is " + text::number(settings.limits.stopping_time, 3) +
-                            " s, but with gears that bend " + gears_keys +
+                            " s, but with elastic gears " + gears_keys +
                             (T > kLongest ? " no brake is stable: their damping is too small"
                                           : " a brake keeps a gain margin of 2 from " +
-                                                text::number(T, 3) + " s on: ask for that"));
+                                                text::number(T, 3) + " s on: set that"));
 }
 
 }  // namespace dashpot::controller

@@ -9,8 +9,8 @@
 
 namespace dashpot::controller {
 
-/// Finds the modes of the closed loop, tick by tick, and hands the loop to the analysis of the
-/// sampled one now and then.
+/// Finds the modes of the closed loop, tick by tick, and passes the loop to the analysis of the
+/// sampled loop at intervals.
 class LoopAnalysis {
  public:
   LoopAnalysis(const RobotModel& model, const Settings& settings);
@@ -30,7 +30,6 @@ class LoopAnalysis {
     return vibration_.due(tick) || (sampled_ && sampled_->due(tick));
   }
   void update(const Loop& loop) noexcept;
-  /// Fetches what another thread found.
   void collect() noexcept { vibration_.collect(); }
   /// Sets `system` to a loop, with the terms and the environment of the settings.
   void closed_loop(const Loop& loop, analysis::System<kMaxJoints>& system) const noexcept;
@@ -40,7 +39,7 @@ class LoopAnalysis {
   SampledAnalysis* sampled() noexcept { return sampled_.get(); }
 
  private:
-  /// What the last analysis was of. qd, wrench and posture_error are zero where they do not matter.
+  /// Input of the last analysis. qd, wrench and posture_error are zero if they do not matter.
   struct Analysed {
     double springs;
     std::uint64_t changes;
@@ -51,7 +50,7 @@ class LoopAnalysis {
   };
 
   void find_modes(const Loop& loop) noexcept;
-  /// Whether the loop is that of the last analysis, exactly.
+  /// Returns true if the loop is exactly the loop of the last analysis.
   bool unchanged(const Loop& loop, bool with_wrench, bool with_velocity) noexcept;
   void hand_over(const Loop& loop) noexcept;
   PassivePart passive(const Loop& loop) const noexcept;
@@ -64,7 +63,7 @@ class LoopAnalysis {
   LoopSystem loop_;
   std::unique_ptr<SampledAnalysis> sampled_;
   std::optional<Analysed> analysed_;
-  bool moved_ = false;  ///< gains or attachment, before the last analysis
+  bool moved_ = false;  ///< gains or attachment had changed before the last analysis
 };
 
 }  // namespace dashpot::controller

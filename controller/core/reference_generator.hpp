@@ -5,16 +5,16 @@
 
 namespace dashpot::controller {
 
-/// Leads the references of the springs to where the set-points want them, as fast as the limits of
-/// tip and joints allow where the robot is. A reference whose springs are not in force starts where
-/// the robot is; of two modes in force, the one that fades away stays where it is.
+/// Moves the references of the springs to the goals, as fast as the limits of tip and joints allow
+/// at the robot's posture. A reference whose springs do not act starts where the robot is; while
+/// modes blend, the reference of the mode that fades stays.
 class ReferenceGenerator {
  public:
   ReferenceGenerator(const RobotModel& model, const Settings& settings);
 
   /// Sets limits of the tip's speed for the references in either mode.
   void limit_tip_speed(const TipSpeed& speed) noexcept;
-  /// T goes from one place on the tip link to another, and the tip's reference with it.
+  /// Moves the tip's reference along as T goes from one place on the tip link to another.
   void carry(const Pose& from, const Pose& to) noexcept;
   /// Sets the goal of the setpoints. With new gains, springs that are to grow from zero start where
   /// the robot is.
@@ -25,12 +25,12 @@ class ReferenceGenerator {
 
   const SpringReferences& references() const noexcept { return references_; }
   const ErrorClamp& clamp() const noexcept { return clamp_; }
-  /// Returns true if all references in force are at rest; one that is not stays as it was.
+  /// Returns true if the references of all active springs are at rest.
   bool still(const Impedance& impedance) const noexcept;
 
  private:
   void start_new_springs(const GainBlend& gains, const Sensed& sensed) noexcept;
-  /// Returns the share of its speed limits at which the tip's reference takes no joint too fast; it
+  /// Returns the share of its speed limits at which the tip's reference moves no joint too fast; it
   /// rises slowly.
   double tip_share(const NullSpace& null_space) noexcept;
   /// Returns the share of its speed limits at which the joints' reference takes the tip no faster

@@ -11,7 +11,7 @@ struct Sensed {
   JointVector q, qd;                          ///< n
   Vector6 external_wrench = Vector6::Zero();  ///< the last finite one
   DynamicsResult robot;
-  JointVector weight;  ///< what is compensated here of the gravity torque, n, N m
+  JointVector weight;  ///< the gravity torque that Dashpot compensates, n, N m
 };
 
 }  // namespace dashpot::controller

@@ -10,38 +10,38 @@
 
 namespace dashpot::controller {
 
-/// What is wanted: the last good set-point with its age, and the gains, the wrench and the
-/// attachment on their way to what was asked for.
+/// The user's command: the last good set-point with its age, and gains, wrench and attachment on
+/// their way to the commanded values.
 class SetpointHistory {
  public:
   SetpointHistory(const RobotModel& model, const Settings& settings);
   /// The set-point is Settings::initial again; gains, and what is attached, stay.
   void reset() noexcept;
-  /// Springs that start next stay where the robot is, with the gains in force.
+  /// Makes springs that start next stay where the robot is, with the current gains.
   void release() noexcept;
 
-  /// The set-point gets older, whatever the clock does after it was accepted.
+  /// Increases the age of the set-point, whatever the clock does after it was accepted.
   void age(double dt) noexcept { age_ += nanoseconds(dt); }
-  /// It is lost at once.
+  /// Makes it lost at once.
   void give_up() noexcept { age_ = std::numeric_limits<double>::infinity(); }
-  /// Whether it is fresh: kOk, kSetpointStale or kSetpointLost.
+  /// Returns whether it is fresh: kOk, kSetpointStale or kSetpointLost.
   Status age_status() const noexcept;
 
   /// What a set-point brings.
   enum class News : std::uint8_t {
-    kRefused,  ///< it is not in order; the last good one stays
-    kNone,     ///< it was looked at before
+    kRefused,  ///< it is invalid; the last good one stays
+    kNone,     ///< it was checked before
     kGoal,
     kGains,  ///< and a goal
   };
-  /// Takes over a set-point that is new and in order at the time `now`, ns.
+  /// Takes over a set-point that is new and valid at the time `now`, ns.
   News take(const Setpoint& setpoint, std::int64_t now) noexcept;
-  /// Gains and wrench start at zero; a set-point that is no user's is where the robot is.
+  /// Starts gains and wrench at zero. Without a user's set-point, the goal is where the robot is.
   void restart(const Sensed& now) noexcept;
   /// Moves gains and wrench on by one period; in `hold` the wrench goes to zero.
   void step(bool hold) noexcept;
 
-  /// The arm is to carry something else. Springs keep their extension if T changes.
+  /// Attaches something else to the arm. Springs keep their extension if T changes.
   void attach(const Attachment& attachment) noexcept;
   /// Moves what is attached on by one period.
   void step_attachment() noexcept { attachment_.step(); }
@@ -72,7 +72,7 @@ class SetpointHistory {
   const int n_;
   const Settings settings_;
   Setpoint accepted_;
-  bool from_user_ = false;    ///< or else it is Settings::initial, where the robot started
+  bool from_user_ = false;    ///< false: it is Settings::initial, where the robot started
   std::optional<Look> look_;  ///< at the last set-point; none yet
   double age_ = 0;            ///< ns
   GainBlend gains_;

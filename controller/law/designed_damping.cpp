@@ -8,7 +8,7 @@ void RatioDamper::set(const JointMatrix& K, double ratio, const JointVector& fri
   design_.set_target(target);
   design_.set_friction(friction);
   if (design_.set_stiffness(K) == analysis::Status::kOk) return;
-  // As much as check_gains lets pass. A slow mode more, and a soft one.
+  // The largest indefiniteness that check_gains accepts. It adds a slow, soft mode.
   JointMatrix raised = K;
   raised.diagonal().array() += 2e-10 * K.cwiseAbs().maxCoeff();
   design_.set_stiffness(raised);
@@ -77,8 +77,8 @@ JointVector DesignedDamping::friction(double share) const noexcept {
 
 void DesignedDamping::set_tip(const Impedance& given, const DynamicsResult& robot) noexcept {
   // If all springs are in the tool's axes, C_C is designed there, because K_C does not change in
-  // them as the tool turns. Springs in both frames are in force only while gains change, so that
-  // K_C is new at every tick.
+  // them as the tool turns. Springs in both frames are active only while gains change, so that K_C
+  // is new at every tick.
   const Matrix6 &K_B = given.base.stiffness, &K_T = given.tool.stiffness;
   const Matrix6 K_C = given.base.none()    ? K_T
                       : !given.tool.none() ? Matrix6(K_B + turned(K_T, robot.R_BT))

@@ -7,8 +7,8 @@
 namespace dashpot::controller {
 
 /// Designs the damping C with which every mode of the stiffness K has one damping ratio, for a mass
-/// M (n x n) that is new at every tick. K is the task's (6 x 6), with a Jacobian (6 x n) that is
-/// new as well, or the joints' (n x n); see analysis::RatioDamping.
+/// M (n x n) that is new at every tick. K belongs to the task (6 x 6), with a Jacobian (6 x n) that
+/// is new as well, or to the joints (n x n); see analysis::RatioDamping.
 ///
 /// C is symmetric, positive semidefinite to rounding, and bounded. The joint damping is at most
 /// 2 ratio omega M for the fastest mode, and next to a singularity the task's C itself is at most
@@ -25,8 +25,8 @@ class RatioDamper {
   /// `friction` is the viscous friction of the joints (n, N m s/rad), which is subtracted from the
   /// damping; without entries there is none.
   void set(const JointMatrix& K, double ratio, const JointVector& friction) noexcept;
-  /// A sampled loop leaves of the ratio what it bears of springs that are in force with the share
-  /// `in_force`; `borne` has to outlive this.
+  /// Lowers the ratio to what the sampled loop tolerates with springs that are active with the
+  /// share `in_force`. The first argument has to outlive this.
   void set_loop(const analysis::BorneDamping& borne, double in_force) noexcept {
     design_.set_loop(&borne, in_force);
   }
@@ -35,7 +35,7 @@ class RatioDamper {
   void update(const JointMatrix& M, const Jacobian* J) noexcept;
   /// Returns C in the axes of K and J.
   const JointMatrix& damping() const noexcept { return C_; }
-  /// Returns what the loop left of the ratio.
+  /// Returns the share of the ratio that the loop allows.
   const analysis::DampingLevel& level() const noexcept { return design_.level(); }
 
  private:
@@ -44,20 +44,20 @@ class RatioDamper {
   analysis::RatioDamping design_;
 };
 
-/// Springs and dampers in force: the blended gains, and, as far as these have a damping ratio, the
-/// C_C and C_q that give this ratio to the springs of tip and joints at the robot's posture. Ratio
-/// and stiffness are the blended ones, so that the damping changes as smoothly as they do. The
-/// given viscous friction is subtracted; if two modes are in force, each subtracts its share.
-/// Where the sampled loop does not bear a ratio, it is lowered. Springs at the tip come with their
+/// Active springs and dampers: the blended gains, and, if these have a damping ratio, the C_C and
+/// C_q that give this ratio to the springs of tip and joints at the robot's posture. Ratio and
+/// stiffness are the blended ones, so that the damping changes as smoothly as they do. The given
+/// viscous friction is subtracted; if two modes are active, each subtracts its share. A ratio with
+/// which the sampled loop would not keep its margin is lowered. Springs at the tip include their
 /// null space.
 class DesignedDamping {
  public:
-  /// `viscous_friction` is the friction of the robot's joints, n, N m s/rad; `borne` is what the
-  /// loop bears. The null space is that of `projector`.
+  /// `viscous_friction` is the friction of the robot's joints, n, N m s/rad. The achievable damping
+  /// of the loop limits the ratios. `projector` defines the null space.
   explicit DesignedDamping(const JointVector& viscous_friction,
                            const analysis::BorneDamping& borne = {},
                            NullProjector projector = NullProjector::kDynamic);
-  DesignedDamping(const DesignedDamping&) = delete;  // the dampers look at what the loop bears
+  DesignedDamping(const DesignedDamping&) = delete;  // the dampers point to the achievable damping
   DesignedDamping& operator=(const DesignedDamping&) = delete;
 
   /// Designs the damping of this tick, and computes the null space if there are springs at the tip.
@@ -69,7 +69,7 @@ class DesignedDamping {
   }
   /// Returns the null space of the last tick with springs at the tip.
   const NullSpace& null_space() const noexcept { return null_space_; }
-  /// Returns what the loop left of the ratios at this tick; `given` are the blended gains.
+  /// Returns the share of the ratios that the loop allows now; `given` are the blended gains.
   analysis::DampingLevel level(const Impedance& given) const noexcept;
   void reset() noexcept { tip_ = joints_ = false; }
 

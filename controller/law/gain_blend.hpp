@@ -11,7 +11,7 @@ namespace dashpot::controller {
 ///
 /// A new target starts a blend from the present value that takes the full time again. Targets that
 /// come every tick are so followed with a lag of about this time. The blend does not start slowly,
-/// because it would then never get going with such targets.
+/// because with such targets it would never leave its start.
 template <class Value>
 class Ramp {
  public:

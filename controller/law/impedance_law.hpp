@@ -7,11 +7,11 @@
 
 namespace dashpot::controller {
 
-/// How far a deflection of the tip may have moved the joints before the posture springs count less
-/// of it, rad (m).
+/// Deflection of the joints by the tip, rad (m), above which the posture springs compensate less of
+/// it.
 inline constexpr double kPostureShare = 0.3;
 
-/// A torque of the law, and what it is made of.
+/// A torque of the law, and its parts.
 struct LawTorque {
   JointVector torque;                    ///< n, N m
   JointVector dampers;                   ///< the part that comes from dampers, n, N m
@@ -20,7 +20,7 @@ struct LawTorque {
   Vector6 tip_error = Vector6::Zero();   ///< e
   Vector6 tip_wrench = Vector6::Zero();  ///< of the Cartesian part
   JointVector posture_error;             ///< q_0 - q - s J# e, n; no entries without null space
-  bool clamped = false;                  ///< the error clamp acts; told for an integral only
+  bool clamped = false;                  ///< the error clamp acts; set with an integral only
 };
 
 /// Computes the joint torque of springs and dampers between robot and reference, and of the
@@ -59,7 +59,7 @@ class ImpedanceLaw {
     const DynamicsResult& robot;
     const JointVector &q, &qd;
     const Impedance& impedance;
-    const NullSpace& null_space;  ///< of these; not looked at without springs at the tip
+    const NullSpace& null_space;  ///< of these; unused without springs at the tip
     const SpringReferences& references;
     const ErrorClamp& clamp;
     const Vector6& wrench;                     ///< f; counts only if FeedForward::wrench is on
@@ -75,7 +75,7 @@ class ImpedanceLaw {
   /// Sets e and K_C e, and the wrench K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d, of which it
   /// returns the second term.
   Vector6 pull_tip(const Input& now, LawTorque& result) noexcept;
-  /// N' K_0 (q_0 - q - s J# e) + N' C_0 N (qd_0 - qd), without the damper in the first.
+  /// Returns N' K_0 (q_0 - q - s J# e) + N' C_0 N (qd_0 - qd); the first term has no damper.
   static void add_null_torque(const Input& now, LawTorque& result) noexcept;
 
   FeedForward feed_forward_;

@@ -111,7 +111,7 @@ bool NullSpace::damp_one_motion(const JointVector& k, const Damping& damping) no
   if (!(std::abs(trace - 1) < kNullRounding)) return false;
   JointVector y = JointVector::Unit(n, best);
   project(y);
-  if (!(std::abs(product(y, y) - most) < kNullRounding)) return false;  // P is no projector
+  if (!(std::abs(product(y, y) - most) < kNullRounding)) return false;  // P is not a projector
   JointVector velocity = y;
   mass_.solve_LT(velocity.data());
   double stiffness = 0;

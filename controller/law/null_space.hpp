@@ -33,9 +33,9 @@ class NullSpace {
   /// Computes the null space of the directions that an impedance selects, and, if it has null-space
   /// springs and a ratio for them, the damping D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, in
   /// energy coordinates: with it every free motion has the ratio on the springs K_0. Next to a
-  /// singularity D fades as the root of what P leaves of the springs, so that there the ratio stays
-  /// as well. In a sampled loop each motion gets the share that the loop bears; of springs that are
-  /// in force in part it takes their share.
+  /// singularity D fades as the root of the springs that P leaves, so that the ratio stays there as
+  /// well. In a sampled loop each motion gets the share of damping with which the loop keeps its
+  /// margin; springs that are active in part count with their share.
   void compute(const DynamicsResult& robot, const Impedance& impedance,
                const analysis::BorneDamping& borne = {}) noexcept;
 
@@ -49,7 +49,7 @@ class NullSpace {
   JointVector ratio_damper(const JointVector& dqd) const noexcept;
   /// Returns D; it has no entries if there is no ratio.
   const JointMatrix& ratio_damping() const noexcept { return ratio_damping_; }
-  /// Returns what the loop left of the ratio.
+  /// Returns the share of the ratio that the loop allows.
   const analysis::DampingLevel& level() const noexcept { return level_; }
   /// Returns the part of the joints' deflection that an error e of the tip explains: J# e of the
   /// projector, N = I - J# J in the selected directions.
@@ -63,7 +63,7 @@ class NullSpace {
   JointVector joint_velocity(const Vector6& twist) const noexcept;
   const TaskInertia& inertia() const noexcept { return inertia_; }
   bool kinematic() const noexcept { return kinematic_; }
-  /// Returns the inertia, or, of a kinematic projector, what is in its place, with I for M.
+  /// Returns the inertia, or, for a kinematic projector, its counterpart with I for M.
   const TaskInertia& of_projector() const noexcept { return kinematic_ ? unit_inertia_ : inertia_; }
   /// Returns L.
   const SmallCholesky& mass() const noexcept { return mass_; }
@@ -77,8 +77,8 @@ class NullSpace {
   void project_joints(JointVector& dq) const noexcept {
     add_torque(J_, -unit_inertia_.wrench(twist(J_, dq)), dq);
   }
-  /// Returns the damping of a free motion of a frequency, 1/s, and includes what is left of it in
-  /// the level.
+  /// Returns the damping of a free motion of a frequency, 1/s, and lowers `level` to its share of
+  /// the ratio.
   struct Damping {
     const Impedance& impedance;
     const analysis::BorneDamping& borne;

@@ -19,14 +19,14 @@ double finite_or(double value, double otherwise) {
 constexpr double kRatio = 0.7;
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
-/// The damping of modes at the tip lets their velocities decay no faster than this, 1/s: far from
-/// where torque that is held for a period of 1 ms and arrives one late makes the loop unstable.
+/// Damping at the tip lets the velocities of modes decay no faster than this, 1/s. A torque that is
+/// held for a period of 1 ms and arrives a period late becomes unstable at much faster decays.
 constexpr double kFastestDecay = 200;
 
 }  // namespace
 
 bool lacks_efforts(const RobotModel& model) {
-  constexpr int kArm = 4;  // joints that make an arm: of a rig of fewer 100 N m will do
+  constexpr int kArm = 4;  // least joints of an arm; for smaller rigs 100 N m is enough
   return model.dof() >= kArm && model.joint_values(&Joint::effort).minCoeff() == kNoLimit;
 }
 
@@ -53,7 +53,7 @@ Settings default_settings(const RobotModel& model) {
     middle[i] = std::isfinite(center) ? center : 0;
   }
   settings.integral.torque = limits.torque / 10;
-  // `validate` refuses it: nobody has said what the joints give
+  // `validate` refuses it, because the joints' torques are unknown
   if (lacks_efforts(model)) limits.torque.setZero();
   settings.motion.velocity = 0.25 * limits.velocity;
   settings.motion.acceleration = limits.velocity;
@@ -82,7 +82,7 @@ Settings default_settings(const RobotModel& model) {
   const double angular = std::min(20.0, 0.5 * kFastest * kFastest * least.angular);
   gains.task_stiffness.diagonal() << linear, linear, linear, angular, angular, angular;
   gains.null_stiffness = 0.25 * gains.joint_stiffness.diagonal();
-  // For springs that are taken away: a ratio of theirs is no damping.
+  // For directions without springs, in which a ratio gives no damping.
   const double slide = std::min(40.0, kFastestDecay * least.linear);
   const double turn = std::min(2.0, kFastestDecay * least.angular);
   gains.task_damping.diagonal() << slide, slide, slide, turn, turn, turn;

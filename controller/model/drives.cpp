@@ -33,7 +33,7 @@ constexpr std::array kDrives = {
            all(0.21, 7),
            {1.137, 1.137, 1.137, 1.137, 0.763, 0.44, 0.248},
            "MuJoCo Menagerie, franka_fr3/fr3.xml (armature, damping, frictionloss)",
-           "how they were found is not told; fr3_drake has about three times as much"},
+           "their origin is not stated; fr3_drake has about three times as much"},
     Drives{
         "fr3_drake",
         7,
@@ -42,7 +42,7 @@ constexpr std::array kDrives = {
         kNone,
         "Drake, manipulation/models/franka_description/README.md: reflected inertia that Franka "
         "states for the FR3",
-        "three times those of fr3; the joint's own torque controller hides a part of it"},
+        "three times the values of fr3; the joint's own torque controller hides a part of it"},
     Drives{"iiwa7", 7, all(4.447, 7), kNone, kNone,
            "Drake, manipulation/models/iiwa_description: rotors of 1.737e-4 kg m^2 behind gears of "
            "160, from C. Ott, Cartesian Impedance Control of Redundant and Flexible-Joint Robots, "
@@ -89,9 +89,8 @@ constexpr std::array kDrives = {
            "of the UR5e; a round number, the same for all joints, not confirmed by a record"},
 };
 
-/// Drives of a file, and the texts that they refer to.
 struct FileDrives {
-  std::string name, source = "not told", doubt = "not told";
+  std::string name, source = "not stated", doubt = "not stated";
   Drives drives{};
 };
 
@@ -112,11 +111,11 @@ void read_drives(const std::string& text, FileDrives& file) {
   if (list == nullptr) throw keys.error("reflected_inertia", "missing");
   const std::size_t joints = list->items.size();
   if (list->kind != text::YamlNode::Kind::kSequence || joints < 1 || joints > Drives::kMost) {
-    throw keys.error("reflected_inertia", "a list of a number for each joint is wanted, kg m^2");
+    throw keys.error("reflected_inertia", "needs a list of a number for each joint, kg m^2");
   }
   Drives& drives = file.drives;
   drives.joints = static_cast<int>(joints);
-  // The units of prismatic joints are those of revolute ones without rad and m.
+  // Prismatic joints have the units of revolute ones, without rad and m.
   read_figures(keys, "reflected_inertia", "", drives.joints, drives.reflected_inertia);
   read_figures(keys, "viscous_friction", "", drives.joints, drives.viscous_friction);
   read_figures(keys, "coulomb_friction", "", drives.joints, drives.coulomb_friction);
@@ -179,8 +178,8 @@ const Drives& find_drives(std::string_view name) {
 const Drives& find_drives(std::string_view name, int n) {
   const Drives& drives = find_drives(name);
   if (drives.joints == n) return drives;
-  throw InvalidModel("drives: those of " + std::string(name) + " have " +
-                     std::to_string(drives.joints) + " joints, the arm has " + std::to_string(n));
+  throw InvalidModel("drives: " + std::string(name) + " has " + std::to_string(drives.joints) +
+                     " joints, the arm has " + std::to_string(n));
 }
 
 const Drives* drives_like(const RobotModel& model) noexcept {

@@ -24,7 +24,7 @@ Eigen::Isometry3d to_eigen(const KDL::Frame& frame) {
   return result;
 }
 
-/// A rotation whose z axis is `axis`; the identity where that will do.
+/// A rotation whose z axis is `axis`, the identity if possible.
 Eigen::Matrix3d with_z(const Eigen::Vector3d& axis) {
   if (axis == Eigen::Vector3d::UnitZ()) return Eigen::Matrix3d::Identity();
   Eigen::Matrix3d R;
@@ -54,10 +54,10 @@ Lanes3 load3(const Four* rows) {
   return {load(rows[0].data()), load(rows[1].data()), load(rows[2].data())};
 }
 
-/// Rotations R of four links, by columns: `rotation` is that from link i to link i - 1 at q = 0,
-/// and link i turns by `angle` about its z axis besides. `last` are the columns of the link before
-/// the four, and then of the fourth. The products along the chain, which have to wait for one
-/// another, take a register for each column.
+/// Rotations R of four links, by columns: `rotation` leads from link i to link i - 1 at q = 0, and
+/// link i also turns by `angle` about its z axis. `last` are the columns of the link before the
+/// four, and then of the fourth. The products along the chain, which have to wait for one another,
+/// take a register for each column.
 Lanes33 link_rotations(const std::array<Four, 9>& rotation, const Vec4d& angle, Vec4d (&last)[3]) {
   Vec4d sine, cosine;
   sin_cos(angle, sine, cosine);
@@ -87,7 +87,7 @@ Lanes33 link_rotations(const std::array<Four, 9>& rotation, const Vec4d& angle, 
   return R;
 }
 
-/// What the way outward tells of four links.
+/// Results of the pass outward for four links.
 struct MovingLinks {
   Lanes33 R;
   Lanes3 e, p, w, wd, a;

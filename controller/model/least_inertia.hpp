@@ -14,8 +14,8 @@ struct TipInertia {
 TipInertia least_tip_inertia(const RobotModel& model, const JointVector& lower,
                              const JointVector& upper);
 
-/// Returns the arm without payload, whose inertia is least, or, where that lacks inertia, the arm
-/// as it is.
+/// Returns the arm without payload, whose inertia is least, or the arm as it is, if it lacks
+/// inertia without its payload.
 RobotModel unloaded(const RobotModel& model);
 
 }  // namespace dashpot::controller

@@ -14,7 +14,8 @@
 namespace dashpot::controller {
 namespace {
 
-/// Share of the chain's moments of inertia that cannot matter: half of it is in frequencies.
+/// Share of the chain's moments of inertia that cannot matter: it changes frequencies by half as
+/// much.
 constexpr double kNegligible = 1e-4;
 constexpr std::size_t kShownLinks = 10;
 
@@ -74,7 +75,7 @@ void doubt_masses(const RobotModel& model, const std::vector<MovedLink>& links,
     if (mass == 0 || (share < kTimes && share > kPart)) continue;
     warnings.push_back(one_line(quoted(link->body.link) + ": its mass, " + text::number(mass, 4) +
                                 " kg, is " + text::number(share, 4) +
-                                " times that of an ordinary link of this arm" +
+                                " times the mass of an ordinary link of this arm" +
                                 (share > 1 ? ": is it in g?" : ": is it in kg?")));
   }
 }
@@ -92,13 +93,13 @@ void doubt_inertias(const RobotModel& model, const std::vector<MovedLink>& links
     warnings.push_back(
         one_line(quoted(link.body.link) + ": its inertia, " + text::number(link.body.moment, 4) +
                  " kg m^2, with its mass, " + text::number(mass, 4) +
-                 " kg, is that of a body larger than the arm, whose " + "links add up to " +
+                 " kg, fits a body larger than the arm, whose " + "links add up to " +
                  text::number(reach, 4) + " m: is it in kg m^2?"));
   }
 }
 
-/// Returns the middle one of the sizes that the links' masses and inertias have, m; a negative
-/// number of fewer than three links.
+/// Returns the median of the sizes that the links' masses and inertias have, m; negative for fewer
+/// than three links.
 double middle_size(const std::vector<MovedLink>& links) {
   std::vector<double> sizes;
   for (const MovedLink& link : links) {
@@ -129,28 +130,28 @@ void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, d
   doubt("payload: its centre is off the tip link by ", payload.center.norm(),
         "is payload.center in m?");
   if (payload.mass > 0) {
-    doubt("payload: its mass and inertia are those of a body of ",
+    doubt("payload: its mass and inertia fit a body of ",
           std::sqrt(0.5 * payload.inertia.trace() / payload.mass), "is its inertia in kg m^2?");
   }
   const double size = middle_size(links);
   if (size > kMiddle * reach || (size >= 0 && size < kLeast * reach)) {
-    warnings.push_back("links: their masses and inertias are those of bodies of " +
-                       text::number(size, 4) + beside + "are inertias in kg m^2?");
+    warnings.push_back("links: their masses and inertias fit bodies of " + text::number(size, 4) +
+                       beside + "are inertias in kg m^2?");
   }
 }
 
-/// Rotors heavier than the arm, and limits of joints that are hardly in rad.
+/// Doubts rotors heavier than the arm, and limits of joints that are hardly in rad.
 void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, double reach,
                   std::vector<std::string>& warnings) {
   constexpr double kTurn = 30;      // rad: five turns, as cables allow
   constexpr double kSpeed = 20;     // rad/s
   constexpr double kEffort = 1e4;   // N m
   constexpr int kArm = 4;           // joints that make an arm
-  constexpr double kNoLimit = 1e6;  // written where there is none
+  constexpr double kNoLimit = 1e6;  // what files write for no limit
   constexpr double kFriction = 2;   // times the effort limit, at the velocity limit
   constexpr double kRotors = 0.1;   // of the arm's mass at its reach, in kg m^2
-  constexpr double kBare = 2e-4;    // kg m^2: all rotors are those of motors without their gears
-  constexpr double kHeavy = 5;      // kg: in an arm that weighs so much
+  constexpr double kBare = 2e-4;    // kg m^2: if all rotors are below, they lack their gear ratios
+  constexpr double kHeavy = 5;      // kg: in an arm of at least this mass
   double mass = model.attachment().mass;
   for (const MovedLink& link : links) mass += link.body.body.getMass();
   const auto doubt = [&](const Joint& joint, const std::string& what) {
@@ -161,17 +162,16 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
   };
   if (lacks_efforts(model)) {
     warnings.emplace_back(
-        "joints: none has a limit of effort (0 is none): whether they hold the arm is not known, "
-        "and "
-        "a controller needs limits.torque");
+        "joints: no joint has a limit of effort (0 means no limit): whether they hold the arm is "
+        "unknown, and a controller needs limits.torque");
   } else if (model.dof() >= kArm) {
     std::string names;
     for (const Joint& joint : model.joints()) {
       if (std::isinf(joint.effort)) names += (names.empty() ? "" : ", ") + joint.name;
     }
     if (!names.empty()) {
-      warnings.push_back(one_line("joints without a limit of effort (0 is none): " + names +
-                                  ": a controller takes 100 N m where limits.torque says nothing"));
+      warnings.push_back(one_line("joints without a limit of effort (0 means no limit): " + names +
+                                  ": a controller assumes 100 N m unless limits.torque is set"));
     }
   }
   const bool bare =
@@ -182,10 +182,10 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
     const bool large = mass > 0 && rotor > kRotors * mass * std::max(1.0, reach * reach);
     if (large || (rotor > 0 && bare)) {
       doubt(joint, "reflected inertia, " + text::number(rotor, 4) +
-                       " kg m^2, is hardly one of an arm of " + text::number(mass, 4) + " kg, " +
-                       text::number(reach, 4) + " m long: is it " +
+                       " kg m^2, is hardly possible for an arm of " + text::number(mass, 4) +
+                       " kg, " + text::number(reach, 4) + " m long: is it " +
                        (large ? "in kg m^2?"
-                              : "that of the motor, to be multiplied by the gear ratio's square?"));
+                              : "the motor's, to be multiplied by the square of the gear ratio?"));
     }
     for (const auto& [kind, told, friction] :
          {std::tuple("viscous", joint.viscous_friction, joint.viscous_friction * joint.velocity),
@@ -200,14 +200,14 @@ void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, 
               " rad, is many turns: is it in deg?");
     limit(joint, joint.velocity, kSpeed,
           "velocity, " + text::number(joint.velocity, 4) +
-              " rad/s, is hardly one of an arm: is it in deg/s or rpm?");
+              " rad/s, is hardly possible for an arm: is it in deg/s or rpm?");
     limit(joint, joint.effort, kEffort,
           "effort, " + text::number(joint.effort, 4) +
-              " N m, is hardly one of an arm: is it in N m?");
+              " N m, is hardly possible for an arm: is it in N m?");
   }
 }
 
-/// Joints that move no mass before the next one does.
+/// Doubts joints that move no mass before the next joint does.
 void doubt_massless(const RobotModel& model, std::vector<std::string>& warnings) {
   for (int i = 0; i < model.dof(); ++i) {
     const KDL::Segment& segment = kdl_chain(model).getSegment(static_cast<unsigned>(i));
@@ -310,7 +310,7 @@ void doubt_units(const RobotModel& model, const std::vector<MovedLink>& links,
   const double gravity = model.gravity().norm();
   if (gravity > kGravity || (gravity > 0 && gravity < kWeak)) {
     warnings.push_back("gravity: " + text::number(gravity, 4) +
-                       " m/s^2 is that of no planet: is it in m/s^2?");
+                       " m/s^2 fits no planet: is it in m/s^2?");
   }
   doubt_massless(model, warnings);
   doubt_joints(model, links, reach, warnings);

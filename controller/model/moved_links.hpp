@@ -24,14 +24,14 @@ void check_links(const std::vector<MovedLink>& links, const ModelOptions& option
                  const KDL::Chain& chain, const std::string& name,
                  std::vector<std::string>& warnings);
 
-/// How far out the arm reaches at most, as the distances of its joints and centres of mass add up,
-/// m.
+/// Returns an upper bound of the arm's reach, the sum of the distances of its joints and centres of
+/// mass, m.
 double reach_of(const KDL::Chain& chain, const std::vector<Joint>& joints);
 
-/// Adds a warning for each figure whose unit is hardly the one of URDFs: a link without mass, or
-/// much heavier or lighter than those of the other joints, inertias of bodies much larger than the
-/// arm, rotors heavier than it, limits of many turns, a tool or payload beyond its reach, and a
-/// weight ten times what a joint can hold. `bare` is the chain with nothing attached.
+/// Adds a warning for each value whose unit is probably wrong: a link without mass, or much heavier
+/// or lighter than the other joints' links, inertias of bodies much larger than the arm, rotors
+/// heavier than it, limits of many turns, a tool or payload beyond its reach, and a weight ten
+/// times what a joint can hold. `bare` is the chain with nothing attached.
 void doubt_units(const RobotModel& model, const std::vector<MovedLink>& links,
                  const KDL::Chain& bare, std::vector<std::string>& warnings);
 

@@ -15,7 +15,7 @@ bool inside(const Joint& joint, double q, double tolerance) {
   return q >= joint.lower - tolerance && q <= joint.upper + tolerance;
 }
 
-/// Whether q fits if it is in degrees.
+/// Returns true if q is inside the limits when it is read in degrees.
 bool fits_degrees(const RobotModel& model, const JointVector& q, double tolerance) {
   for (int i = 0; i < model.dof(); ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
@@ -26,7 +26,7 @@ bool fits_degrees(const RobotModel& model, const JointVector& q, double toleranc
 }
 
 constexpr double kSingular = 0.02;     // of the largest singular value of J, in m and rad
-constexpr double kWellRegular = 0.05;  // likewise, where nobody chose the posture
+constexpr double kWellRegular = 0.05;  // likewise, for a default posture
 
 Eigen::MatrixXd jacobian(const RobotModel& model, const JointVector& q) {
   return evaluate(model, q, JointVector::Zero(model.dof())).J;
@@ -150,7 +150,7 @@ std::string start_fault(const RobotModel& model, const Settings& settings, const
     if (std::abs(torque[i] - weight[i]) <= friction + largest) continue;
     line << "joint '" << joint.name << "' holds " << torque[i]
          << ", but the model's weight there is " << weight[i]
-         << " N m: is the base tilted, the payload another, or the torque none that holds the arm? "
+         << " N m: is the base tilted, the payload another, or does the torque not hold the arm? "
             "watchdog.start_torque: none accepts any";
     return line.str();
   }

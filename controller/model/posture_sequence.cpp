@@ -30,7 +30,7 @@ PostureSequence::PostureSequence(const JointVector& lower, const JointVector& up
     step_[i] = std::pow(phi, -static_cast<double>(i + 1));
     if (seed != 0) offset_[i] = next_share(seed);
     if (lower_[i] <= upper_[i]) continue;
-    if (lower[i] > 0) {  // limits that are all beyond half a turn; the other may be infinite
+    if (lower[i] > 0) {  // both limits are beyond half a turn; the upper one may be infinite
       upper_[i] = std::min(upper[i], lower[i] + 2 * std::numbers::pi);
     } else {
       lower_[i] = std::max(lower[i], upper[i] - 2 * std::numbers::pi);

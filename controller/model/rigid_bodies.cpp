@@ -13,7 +13,7 @@ constexpr double kInertiaRounding = 0.005;  // of published inertias, relative
 constexpr double kSmallest = 1e-12;         // squared radius of gyration that counts, m^2
 constexpr double kLightest = 1e-6;          // kg
 
-/// By how much the largest moment exceeds the sum of the others: " by 8.6 %", or " far".
+/// Returns by how much the largest moment exceeds the sum of the others: " by 8.6 %", or " far".
 std::string excess_text(const Eigen::Vector3d& moments) {
   const double excess = moments[2] / (moments[0] + moments[1]) - 1;
   if (!(excess > 0 && excess < 10)) return " far";

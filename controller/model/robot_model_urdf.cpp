@@ -125,7 +125,7 @@ void check_gears(const std::vector<Joint>& joints, const std::string& name) {
   if (elastic <= most) return;
   throw InvalidModel(name + ": gear stiffness: " + std::to_string(elastic) + " of " +
                      std::to_string(joints.size()) + " joints are elastic, at most " +
-                     std::to_string(most) + " of so many can be; give the others none");
+                     std::to_string(most) + " can be; set the others to none");
 }
 
 /// Sets the gears, and what the drives' torque controllers make of the reflected inertia.
@@ -242,7 +242,7 @@ std::vector<MovedLink> make_chain(const urdf::ModelInterface& tree,
   KDL::Chain& chain = data.chain;
   KDL::Segment segment;  // being put together; the first, what stands still, is dropped
   KDL::RigidBodyInertia body = KDL::RigidBodyInertia::Zero();
-  KDL::Frame frame;  // of the last link of the path in that of the segment
+  KDL::Frame frame;  // of the last link of the path in the segment's frame
   std::size_t moving = 0;
   const auto finish = [&] {
     if (moving == 0) return;
@@ -277,7 +277,7 @@ std::vector<MovedLink> make_chain(const urdf::ModelInterface& tree,
   return moved;
 }
 
-/// Names the joints whose limits of position do not count, because they turn without end.
+/// Warns of the position limits of joints that turn without end, because they do not count.
 void doubt_limits(const std::vector<urdf::JointConstSharedPtr>& path,
                   std::vector<std::string>& warnings) {
   for (const urdf::JointConstSharedPtr& joint : path) {
@@ -293,7 +293,7 @@ void doubt_limits(const std::vector<urdf::JointConstSharedPtr>& path,
   }
 }
 
-/// Names the joints whose places are turned by more than a turn.
+/// Warns of joints whose origins are rotated by more than a turn.
 void doubt_turns(const std::vector<urdf::JointConstSharedPtr>& path, const UrdfTree& tree,
                  std::vector<std::string>& warnings) {
   for (const urdf::JointConstSharedPtr& joint : path) {
@@ -304,8 +304,7 @@ void doubt_turns(const std::vector<urdf::JointConstSharedPtr>& path, const UrdfT
   }
 }
 
-/// What is wrong with the inertias of links before the first moving joint, which nothing depends
-/// on.
+/// Warns of wrong inertias of links before the first moving joint, which affect nothing.
 void doubt_base(const urdf::ModelInterface& tree, const std::string& base,
                 const std::vector<urdf::JointConstSharedPtr>& path,
                 std::vector<std::string>& warnings) {
@@ -321,8 +320,8 @@ void doubt_base(const urdf::ModelInterface& tree, const std::string& base,
   }
 }
 
-/// The joint nearest to the tip that nothing resists, as the pivots of M from its last row up tell
-/// at some ordinary position; -1 if there is none.
+/// The joint nearest to the tip that no inertia resists, according to the pivots of M from its last
+/// row up at an ordinary position; -1 if there is none.
 int unresisted_joint(const RobotModel& model, double phase) {
   const int n = model.dof();
   JointVector q(n);
@@ -332,7 +331,7 @@ int unresisted_joint(const RobotModel& model, double phase) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
     if (joint.elastic()) M(i, i) -= joint.reflected_inertia;
   }
-  double scale = M.diagonal().maxCoeff();  // of what rounds
+  double scale = M.diagonal().maxCoeff();  // of the numbers whose rounding errors count
   for (const KDL::Segment& segment : kdl_chain(model).segments) {
     const KDL::RigidBodyInertia& body = segment.getInertia();
     scale = std::max(scale, body.getMass() * KDL::dot(body.getCOG(), body.getCOG()));
@@ -346,7 +345,7 @@ int unresisted_joint(const RobotModel& model, double phase) {
   return -1;
 }
 
-/// Masses are there where they are needed.
+/// Throws unless each joint moves a mass or has a reflected inertia.
 void check_inertia(const RobotModel& model, const std::string& name) {
   if (unresisted_joint(model, 1.0) < 0) return;
   const int i = unresisted_joint(model, 2.5);

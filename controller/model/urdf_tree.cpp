@@ -19,7 +19,7 @@
 namespace dashpot::controller {
 namespace {
 
-/// While it lives, keeps what urdfdom has to say.
+/// Collects the messages of urdfdom during its lifetime.
 class Messages : public console_bridge::OutputHandler {
  public:
   Messages() : previous_(console_bridge::getOutputHandler()) {
@@ -51,7 +51,7 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
   std::shared_ptr<urdf::ModelInterface> model;
   if (text.find('<') == std::string::npos) {
     throw InvalidModel(
-        one_line(name + ": is no robot description: it has no XML in it" +
+        one_line(name + ": is not a robot description: it contains no XML" +
                  (text.find("urdf:") == std::string::npos
                       ? ""
                       : "; a configuration or scene names one under robot.urdf, and is read by "
@@ -66,7 +66,7 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
   } catch (const std::exception& error) {
     throw InvalidModel(one_line(name + ": " + error.what()));
   }
-  // If urdfdom cannot read a number, it only says so and goes on.
+  // If urdfdom cannot read a number, it only logs that and continues.
   if (!model || messages.any()) throw InvalidModel(one_line(name + ": " + messages.errors()));
   return model;
 }
@@ -93,8 +93,8 @@ void check_tree(const urdf::ModelInterface& model, const std::string& name) {
   }
 }
 
-/// How many letters have to be left out, put in or replaced to make one word of the other; words
-/// are compared by their first 100 bytes.
+/// Returns how many letters have to be deleted, inserted or replaced to turn one word into the
+/// other; compares the first 100 bytes of the words.
 std::size_t edits(const std::string& a, const std::string& b) {
   constexpr std::size_t kLongest = 100;
   const std::size_t m = std::min(a.size(), kLongest), n = std::min(b.size(), kLongest);

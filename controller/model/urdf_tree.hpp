@@ -15,7 +15,7 @@ namespace dashpot::controller {
 [[noreturn]] void refuse(const std::string& name, const std::string& kind,
                          const std::string& element, const std::string& reason);
 
-/// A URDF as urdfdom has it, and what text::PlainUrdf tells of it.
+/// A URDF as parsed by urdfdom, with the additional results of text::PlainUrdf.
 struct UrdfTree {
   std::shared_ptr<urdf::ModelInterface> model;
   std::map<std::string, text::MotionLimits, std::less<>> limits;  ///< by joint

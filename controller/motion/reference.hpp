@@ -59,7 +59,7 @@ Eigen::Vector3d short_turn(Eigen::Quaterniond turn) noexcept;
 /// vector), the reference moves along
 ///     ErrorClamp::clamped(e + d) - e.
 /// So it brakes for the edge of the clamp as for a goal, moves along with a robot that cannot
-/// follow or is led away, and returns from there: nothing winds up.
+/// follow or is moved by force, and returns from there without wind-up.
 class TipReference {
  public:
   TipReference(const TwistNorm& norm, double period, int smoothing) noexcept

@@ -64,7 +64,7 @@ Status HostedController::update(const dashpot_state* given, const dashpot_setpoi
       any ? controller_.update(state, setpoint_, torque) : controller_.update(state, torque);
   located_ |= status < Status::kStateNotFinite;
   const bool latched = controller_.snapshot().fault != Status::kOk;
-  if (latched_ && !latched) forget_setpoint();  // released by a rest
+  if (latched_ && !latched) forget_setpoint();  // released after a rest
   latched_ = latched;
   if (status < Status::kStateNotFinite) judgement.locate(controller_.snapshot().position);
   if (!accepted) status = worse(status, Status::kSetpointRejected);
@@ -81,13 +81,13 @@ Status HostedController::update(const dashpot_state* given, const dashpot_setpoi
 }
 
 void HostedController::reset(const JointVector& torque) noexcept {
-  take_up(nullptr, time_);  // the gains in it stay, and what is attached
+  take_up(nullptr, time_);  // gains and attachment in it stay
   controller_.reset(torque);
   forget_setpoint();
   forgotten_ = latched_ = stopped_ = located_ = false;
   published_modes_ = 0;
-  vibrations.write(controller_.vibration());  // there is none
-  snapshots.write(controller_.snapshot());    // likewise: that of tick 0
+  vibrations.write(controller_.vibration());  // empty
+  snapshots.write(controller_.snapshot());    // of tick 0
 }
 
 void HostedController::stop() noexcept {
@@ -118,7 +118,7 @@ void HostedController::take_up_tip(const Request& latest) noexcept {
 
 bool HostedController::take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept {
   const std::int64_t last = setpoint_.time;
-  const Pose tool = tool_;  // of a set-point that the caller gives: no tick has told of another
+  const Pose tool = tool_;  // for the caller's set-point, which refers to the T of an earlier tick
   bool accepted = true;
   if (requests.fetch()) {
     const Request& latest = requests.value();
@@ -139,7 +139,7 @@ bool HostedController::take_up(const dashpot_setpoint* wanted, std::int64_t now)
     setpoints_ = latest.setpoints;
     gain_changes_ = latest.gain_changes;
     if (setpoint_.time == last)
-      setpoint_.time = later(last, 1);  // equal times would say that nothing is new
+      setpoint_.time = later(last, 1);  // with an equal time it would be ignored
   }
   const bool old = wanted != nullptr && forgotten_ && wanted->struct_size == sizeof *wanted &&
                    wanted->time == given_time_;

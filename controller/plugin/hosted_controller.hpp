@@ -13,20 +13,21 @@
 
 namespace dashpot::controller {
 
-/// What the other thread wants, as a whole: whichever the real-time thread fetches is complete.
+/// The commands of the other thread as a whole: each request that the real-time thread fetches is
+/// complete.
 struct Request {
-  std::uint64_t setpoints = 0;  ///< how many were given so far
+  std::uint64_t setpoints = 0;  ///< number given so far
   std::uint64_t gain_changes = 0;
   std::uint64_t releases = 0;
   std::uint64_t attachments = 0;
   std::uint64_t tip_speeds = 0;
   Attachment attachment;
   TipSpeed tip_speed;
-  bool on_arrival = false;  ///< the set-point's time is that of the tick that takes it up
+  bool on_arrival = false;  ///< the tick that takes up the set-point sets its time
   Setpoint setpoint;        ///< with the gains
 };
 
-/// One controller, and what its two threads hand each other.
+/// One controller, and the data that its two threads exchange.
 struct HostedController {
   explicit HostedController(const Config& config);
 
@@ -39,7 +40,7 @@ struct HostedController {
   const DynamicsKernel kernel;
   mutable Judgement judgement;
   /// Finds the closed loop of gains at a posture at rest, and its modes. Returns kOk, or the status
-  /// of a controller that cannot be there. Throws what allocation does.
+  /// of an impossible state. Throws only what allocation throws.
   Status at_posture(const JointVector& q, const Gains& gains, Mode mode, VibrationTask& task,
                     Vibration& found) const;
 
@@ -56,7 +57,6 @@ struct HostedController {
                 JointVector& torque) noexcept;
   /// Without entries: the last torque acts.
   void reset(const JointVector& torque) noexcept;
-  /// Gives the set-point up, until there is a new one.
   void stop() noexcept;
   bool needs_brakes() const noexcept {
     return controller::needs_brakes(controller_.snapshot().status, controller_.snapshot().fault);
@@ -64,20 +64,19 @@ struct HostedController {
 
  private:
   void forget_setpoint() noexcept;
-  /// Takes over what is attached, and how fast the tip may be. The set-point in force keeps its
-  /// place on the tip link.
+  /// Takes over attachment and tip speed. The current set-point keeps its place on the tip link.
   void take_up_tip(const Request& latest) noexcept;
-  /// Puts what the caller and the other thread want into `setpoint_`. False if `wanted` is there,
-  /// but no set-point; the one in force stays then.
+  /// Puts the commands of the caller and of the other thread into `setpoint_`. Returns false, and
+  /// keeps the current set-point, if `wanted` is given but invalid.
   bool take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept;
-  /// As long as no set-point was given: makes one with which the springs stay where they are, and
-  /// are never stale. False if there is none: before the robot is located, or where it must not be.
+  /// Before a set-point was given: makes one with which the springs stay where they are and are
+  /// never stale. Returns false before the robot is located, or where it must not be.
   bool stay(std::int64_t now) noexcept;
 
   Controller controller_;
-  Setpoint setpoint_;            ///< in force
-  bool has_setpoint_ = false;    ///< one was given
-  bool stopped_ = false;         ///< it was given up, and there is no other
+  Setpoint setpoint_;            ///< current
+  bool has_setpoint_ = false;    ///< a set-point was given
+  bool stopped_ = false;         ///< it was given up, and no other was given
   bool located_ = false;         ///< the controller knows where the robot is
   std::int64_t time_ = 0;        ///< of the last state, ns
   std::uint64_t setpoints_ = 0;  ///< of the other thread, taken up so far
@@ -85,11 +84,11 @@ struct HostedController {
   std::uint64_t releases_ = 0;
   std::uint64_t attachments_ = 0;
   std::uint64_t tip_speeds_ = 0;
-  Pose tool_;                    ///< T in the tip link, of the set-points
-  bool latched_ = false;         ///< a fault was, after the last tick
-  std::int64_t given_time_ = 0;  ///< of the last set-point that the caller gave, as it was given
-  bool forgotten_ = false;       ///< it was, with the release of a fault: it is none any more
-  std::uint64_t published_modes_ = 0;  ///< the tick they belong to
+  Pose tool_;                          ///< T in the tip link, of the set-points
+  bool latched_ = false;               ///< a fault was latched after the last tick
+  std::int64_t given_time_ = 0;        ///< of the caller's last set-point, unchanged
+  bool forgotten_ = false;             ///< the release of a fault made that set-point invalid
+  std::uint64_t published_modes_ = 0;  ///< tick of the published modes
   analysis::Status published_status_ = analysis::Status::kOk;
 };
 
@@ -100,17 +99,16 @@ JointVector weight_of(const HostedController& controller, const Attachment& atta
 /// Sets what dashpot_last_error says; returns `code`.
 std::int32_t finish(std::int32_t code, const char* text) noexcept;
 std::int32_t finish(std::int32_t code) noexcept;
-/// Likewise DASHPOT_OK, with something to be warned of after what the call has warned of so far; to
-/// be called after finish(DASHPOT_OK).
+/// Adds a warning to DASHPOT_OK and the call's earlier warnings; to be called after
+/// finish(DASHPOT_OK).
 std::int32_t warn(const char* text) noexcept;
-/// Warns of what is doubtful about gains.
 void warn_of_gains(const HostedController& controller, const Gains& gains) noexcept;
-/// What is too little in a verdict of gains, found `here` or wherever the robot may be, in one
+/// Describes a verdict with too little margin, found `here` or wherever the robot may be, in one
 /// line: the margin, what `became` of the gains, and what the model lacks that may be why.
 using VerdictText = std::array<char, 960>;
 VerdictText describe(Judgement& judgement, const GainJudge::Verdict& verdict, const Gains& gains,
                      bool here, const char* became = "") noexcept;
-/// Puts the gains given into `wanted`. DASHPOT_OK or why they are none.
+/// Puts the given gains into `wanted`. Returns DASHPOT_OK, or why the gains are invalid.
 std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexcept;
 
 /// Returns a controller as dashpot_create does, from a configuration that was read before. Throws

@@ -1,4 +1,4 @@
-// What the other thread changes in a running loop: gains, what the tip carries, how fast it may be.
+// Changes of a running loop by the other thread: gains, payload, tool, tip speed.
 #include <dashpot/controller/plugin/hosted_controller.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
@@ -27,8 +27,8 @@ Attachment read(const dashpot_payload& given, const Pose& tool_now) {
   return {payload, tool};
 }
 
-/// Whether the torque limits hold the arm's weight at q, or what is too much is less than before.
-/// DASHPOT_OK or why not.
+/// Returns DASHPOT_OK if the torque limits hold the arm's weight at q, or exceed it less than
+/// before, and otherwise why not.
 std::int32_t check_weight(const dashpot_controller& controller, const Attachment& attachment,
                           const JointVector& q) noexcept {
   if (!controller.settings.feed_forward.gravity || q.size() == 0) return finish(DASHPOT_OK);
@@ -47,7 +47,7 @@ std::int32_t check_weight(const dashpot_controller& controller, const Attachment
   return finish(DASHPOT_OK);
 }
 
-/// Judges a change as a whole. DASHPOT_OK, perhaps with a warning, or why not.
+/// Judges a change as a whole. Returns DASHPOT_OK, perhaps with a warning, or why not.
 std::int32_t judge_change(dashpot_controller& controller, const Gains& gains,
                           const Attachment& attachment, const JointVector& q) noexcept {
   Judgement& judgement = controller.judgement;

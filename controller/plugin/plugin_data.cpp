@@ -16,7 +16,7 @@ Eigen::Map<const RowMajor> square(const double* data, int size) noexcept {
   return {data, size, size};
 }
 
-/// Copies fields into those of C structs, matrices row by row.
+/// Copies fields into the fields of C structs, matrices row by row.
 struct ToC {
   template <class From, class To>
   void operator()(const From& from, To& to) const noexcept {
@@ -95,7 +95,6 @@ static_assert(DASHPOT_REUSED == static_cast<int>(analysis::SpectrumOrigin::kReus
 static_assert(DASHPOT_DIRECT == static_cast<int>(analysis::SpectrumOrigin::kDirect));
 static_assert(DASHPOT_MAX_JOINTS == kMaxJoints);
 
-/// A damping ratio above zero stands in place of a damping matrix.
 bool ratio_fits(const double* damping, const double* ratio) noexcept {
   return ratio == nullptr || *ratio == 0 || damping == nullptr;
 }

@@ -8,17 +8,17 @@
 
 namespace dashpot::controller {
 
-/// The fields of `given`, or a state without entries if it is missing or is not one of n joints;
-/// its time is then `time`.
+/// Returns the fields of `given`, or, if it is missing or does not have n joints, a state without
+/// entries at `time`.
 RobotState to_state(const dashpot_state* given, int n, std::int64_t time) noexcept;
 
 /// Sets all of `setpoint` but its gains, or returns the negative code that says why not, and leaves
-/// it as it is. DASHPOT_ON_ARRIVAL becomes `now`. That numbers are possible is not checked.
+/// it as it is. DASHPOT_ON_ARRIVAL becomes `now`. Does not check whether the numbers are possible.
 std::int32_t to_setpoint(const dashpot_setpoint* given, int n, std::int64_t now,
                          Setpoint& setpoint) noexcept;
 
-/// Sets those of `gains` that are given, or returns the negative code that says why not. That the
-/// numbers are possible is not checked.
+/// Sets the given members of `gains`, or returns the negative code that says why not. Does not
+/// check whether the numbers are possible.
 std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept;
 
 void to_c(const DynamicsResult& dynamics, dashpot_dynamics& out) noexcept;

@@ -65,7 +65,7 @@ VerdictText describe(Judgement& judgement, const GainJudge::Verdict& verdict, co
     std::snprintf(
         text.data(), text.size(),
         "with the %s gains, whose damping counts with the payload, the sampled loop has a "
-        "gain margin of %.3g %s once the payload is dropped; %.3g is needed: ask for less "
+        "gain margin of %.3g %s once the payload is dropped; %.3g is needed: choose less "
         "stiffness or a smaller ratio",
         mode, verdict.margin, where, std::min(GainJudge::kDropped, judgement.wanted()));
   } else {
@@ -98,7 +98,7 @@ std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexce
 
 namespace {
 
-/// Judges gains at q, or, where `q` has no entries, anywhere. DASHPOT_OK or why not.
+/// Judges gains at q, or at any posture if `q` has no entries. Returns DASHPOT_OK or why not.
 std::int32_t judge(dashpot_controller& controller, const Gains& gains, const JointVector& q,
                    double* margin) noexcept {
   Judgement& judgement = controller.judgement;
@@ -113,7 +113,7 @@ std::int32_t judge(dashpot_controller& controller, const Gains& gains, const Joi
   return finish(DASHPOT_UNSTABLE_GAINS, describe(judgement, verdict, gains, q.size() != 0).data());
 }
 
-/// The controller that `make` makes. Null, and the error is set, where it throws.
+/// Returns the controller that `make` makes; null, with the error set, if it throws.
 template <class Make>
 dashpot_controller* make_controller(const Make& make) noexcept try {
   dashpot_controller* const controller = make();
@@ -135,7 +135,7 @@ std::int32_t read_joints(const dashpot_controller* controller, const double* giv
   return values.allFinite() ? DASHPOT_OK : finish(DASHPOT_WRONG_VALUE);
 }
 
-/// Whether the arm can be at q. DASHPOT_OK or why not.
+/// Returns DASHPOT_OK if the arm can be at q, and otherwise why not.
 std::int32_t check_place(const dashpot_controller& controller, const JointVector& q) noexcept {
   constexpr double kOutside = 0.1;  // rad (m), as at the start
   if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
@@ -147,7 +147,6 @@ std::int32_t check_place(const dashpot_controller& controller, const JointVector
   }
 }
 
-/// Whether there is a struct to write to.
 template <class Struct>
 std::int32_t check_result(const dashpot_controller* controller, const Struct* result) noexcept {
   if (controller == nullptr || result == nullptr) return DASHPOT_NULL_ARGUMENT;
@@ -381,9 +380,9 @@ int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampl
 const char* dashpot_status_text(int32_t status) {
   switch (status) {
     case DASHPOT_NULL_ARGUMENT:
-      return "a pointer that has to be there is NULL";
+      return "a required pointer is NULL";
     case DASHPOT_WRONG_STRUCT_SIZE:
-      return "struct_size is not that of this version of plugin.h";
+      return "struct_size does not match this version of plugin.h";
     case DASHPOT_WRONG_JOINTS:
       return "joints is not the robot's number of joints";
     case DASHPOT_WRONG_VALUE:

@@ -17,7 +17,6 @@ class Judgement {
         judge_(model, settings),
         attached_(model.attachment()) {}
 
-  /// Sets where the robot is now (n, rad). For one thread.
   void locate(const JointVector& q) noexcept {
     for (int i = 0; i < joints_; ++i) {
       const auto at = static_cast<std::size_t>(i);
@@ -25,8 +24,7 @@ class Judgement {
     }
     located_.store(true, std::memory_order_release);
   }
-  /// Sets `q` to where the robot was in its last good state or two, joint by joint; false if
-  /// that is not known.
+  /// Sets `q` to the joints' positions in the last good state or two; false before the first one.
   bool where(JointVector& q) const noexcept {
     if (!located_.load(std::memory_order_acquire)) return false;
     q.resize(joints_);
@@ -36,23 +34,23 @@ class Judgement {
     return true;
   }
 
-  /// Judges gains that have passed check_gains, at q or, if that has no entries, because nobody
-  /// knows where the robot is, anywhere. Throws if there is no memory.
+  /// Judges gains that have passed check_gains, at q, or at any posture if q has no entries because
+  /// the robot's posture is unknown. Throws if there is no memory.
   GainJudge::Verdict judge(const Gains& gains, const JointVector& q) {
     const std::lock_guard lock(mutex_);
     return look(gains, q, true);
   }
-  /// What becomes of a change.
+  /// Result of judging a change.
   struct Change {
-    GainJudge::Verdict verdict;  ///< of what it leads to
-    double before;  ///< margin of what it leaves; that of the verdict if that is enough
+    GainJudge::Verdict verdict;  ///< of the new state
+    double before;               ///< margin of the old state; if the verdict is enough, its margin
     bool taken;
   };
   /// Judges the change from the gains `before` to `wanted`, both of which have passed check_gains,
   /// and to another attachment, as a whole. It is taken if the verdict is enough, or better than
-  /// that of the state it leaves. Gains that were accepted last with the same attachment, no joint
-  /// further than 0.1 rad from q, pass unjudged. A change that is not taken, or judging which
-  /// throws, leaves everything as it was. Otherwise as judge().
+  /// the verdict on the old state. Gains that were accepted last with the same attachment, no joint
+  /// further than 0.1 rad from q, pass without a new verdict. A change that is not taken, or an
+  /// exception, leaves everything as it was. Otherwise as judge().
   Change change(const Gains& before, const Gains& wanted, const JointVector& q,
                 const Attachment& attachment) {
     const std::lock_guard lock(mutex_);
@@ -114,7 +112,7 @@ class Judgement {
   const double wanted_;
   std::array<std::atomic<double>, kMaxJoints> position_{};
   std::atomic<bool> located_{false};
-  std::mutex mutex_;  ///< of what follows
+  std::mutex mutex_;  ///< guards the following members
   GainJudge judge_;
   Attachment attached_;
   bool any_ = false;

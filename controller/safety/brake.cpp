@@ -12,39 +12,39 @@ namespace {
 constexpr double kMargin = 10;          // of gain, that the sampled loop keeps
 constexpr double kNearMargin = 3;       // likewise at the edge of an interval
 constexpr double kNear = 0.2;           // t / T: short, so that the law keeps its say
-constexpr double kFullVelocity = 0.85;  // of a velocity limit: the rest is for what nobody expects
-constexpr double kSlowly = 0.5;  // of a velocity limit: what is slower may be pressing on something
-constexpr double kBraking = 0.5;        // of the torque that is left: the rest is for other joints
+constexpr double kFullVelocity = 0.85;  // of a velocity limit: the rest is a reserve
+constexpr double kSlowly = 0.5;         // of a velocity limit: slower joints may press on something
+constexpr double kBraking = 0.5;        // of the remaining torque: the rest is for other joints
 constexpr double kLeastBraking = 0.1;   // of a torque limit, whatever the weight
 constexpr double kReturn = 0.025;       // of a velocity limit
-constexpr double kFastestStop = 1000;   // velocity limits: no robot, and sums stay finite
+constexpr double kFastestStop = 1000;   // velocity limits: faster than any robot; sums stay finite
 constexpr double kMarginShare = 0.02;   // of the way between two position limits
 constexpr double kFell = 0.5;           // of the kinetic energy: the brake has acted,
 constexpr double kRose = 0.1;           // and drives the arm back
-constexpr double kSlowAlready = 0.1;    // of velocity limits: no brake has to be softer
+constexpr double kSlowAlready = 0.1;    // of velocity limits: the brake need not be softer
 constexpr double kSoftest = 8;          // times T
 constexpr double kMemory = 0.5;         // s, ten times as long as the brake needs
 constexpr double kPushed = 0.5;         // of velocity limits: somebody pushes the arm
-constexpr double kPushedLeast = 1;      // rad/s, or m/s: as fast as a hand pushes, be the limit low
+constexpr double kPushedLeast = 1;      // rad/s, or m/s: the speed of a pushing hand
 constexpr double kStiffness = 2.0 / 9;  // times c^2: with it motion decays with c / 3 and 2 c / 3
 constexpr double kSmooth = 0.1;         // of T: time constant of velocities
 constexpr double kStands = 0.03;        // of a velocity limit
-constexpr double kSlows = 2;            // s: what slows down more slowly is driven
-constexpr double kFades = 0.5;          // s: resistance that nobody sees
+constexpr double kSlows = 2;            // s: slower deceleration means that the arm is driven
+constexpr double kFades = 0.5;          // s: of the resistance while the motion is not observed
 constexpr double kAllTorque = 0.999;    // of a torque limit
 constexpr double kResists = 0.5;        // of a torque limit
 constexpr double kRounding = 1e-9;      // N m or rad/s^2, in coordinates in which the mass is 1
 constexpr double kSoft = 1e-7;          // of a bound of acceleration, beside one of torque
 constexpr double kMarginMost = 0.02;    // rad, m
 constexpr double kNearby = 0.02;        // rad (m), or of the inertia: M^-1 is about the same
-constexpr double kAbout = 1.5;          // times an acceleration that is known about
+constexpr double kAbout = 1.5;          // times an acceleration that is known approximately
 
-/// The velocity with which a joint may move toward a limit at a distance.
+/// The velocity of a joint toward a limit at a distance.
 double before(double distance, double braking, double reaction) noexcept {
   if (distance < 0) return distance / reaction;
   if (std::isinf(distance)) return distance;
   const double delayed = braking * reaction;
-  // Two forms of the same: the first has no digits where the distance is short.
+  // Two forms of the same value: the first has no significant digits at a short distance.
   return 2 * braking * distance / (std::sqrt(delayed * delayed + 2 * braking * distance) + delayed);
 }
 
@@ -124,11 +124,11 @@ void Brake::resist(const Motion& motion, const JointVector& wanted, double stiff
     Bounds& bounds = joint(i);
     const double v = std::abs(v_[i] - wanted[i]);
     bounds.slowest = seen_ ? std::min(v, (1 - period_ / kSlows) * bounds.slowest) : v;
-    // It is slow already, or what moves it is stronger than the brake.
+    // The joint is slow already, or its cause of motion is stronger than the brake.
     const double least = kStands * bounds.velocity;
     slow &= v <= least || v - bounds.slowest > least;
     const double moved = seen_ ? motion.q[i] - q_[i] : 0;
-    if (wanted[i] * moved <= 0) way[i] = moved;  // on its way back nothing presses but the brake
+    if (wanted[i] * moved <= 0) way[i] = moved;  // on its way back only the brake presses
   }
   stands_ |= slow;
   add_product(motion.robot.M, way, growth, -stiffness);
@@ -166,7 +166,7 @@ void Brake::watch(const Motion& motion) noexcept {
   given_ = given_ * (1 - period_ / kMemory) + power * period_;
   fell_ |= energy <= kFell * most_;
   const bool driven_back = fell_ && energy > least_ + kRose * most_ + slow;
-  if (driven_back && !stands_ && soften()) {  // a spring that holds gives back what pushed it
+  if (driven_back && !stands_ && soften()) {  // a holding spring returns the energy of a push
     least_ = energy;
     given_ = 0;
   }
@@ -177,7 +177,7 @@ bool Brake::soften() noexcept {
   const bool can = 2 * softness_ <= kSoftest * (1 + 1e-9);
   if (!can) return false;
   softness_ *= 2;
-  for (Eigen::Index i = 0; i < n_; ++i) joint(i).resistance /= 4;  // as its stiffness
+  for (Eigen::Index i = 0; i < n_; ++i) joint(i).resistance /= 4;  // like its stiffness
   return true;
 }
 
@@ -303,8 +303,8 @@ bool Brake::clip(const Motion& motion, const JointVector& last,
   return clipped;
 }
 
-/// Lawson and Hanson's way to a least constraint: one bound more at a time, the one that is missed
-/// by most, and out again with those that would have to be driven to theirs.
+/// Lawson and Hanson's method for the least constraint: adds the bound that is missed by most, and
+/// removes bounds whose joints would have to be driven to them.
 Status Brake::constrain(const Motion& motion, const JointVector& last, bool stops,
                         JointVector& excess) noexcept {
   Status status = Status::kOk;
@@ -350,7 +350,7 @@ Status Brake::constrain(const Motion& motion, const JointVector& last, bool stop
       (torque ? now : excess)[h.bound.joint] += h.factor * h.scale;
     }
   }
-  if (!solved) {  // many joints that are hard to tell apart: all alike, and each by itself
+  if (!solved) {  // nearly dependent bounds of many joints: scale all alike, then each
     double share = 1;
     for (Eigen::Index i = 0; i < n_; ++i) {
       const double way = wanted[i] < 0 ? -1 : 1;
@@ -424,7 +424,7 @@ bool Brake::factor_held() noexcept {
 }
 
 void Brake::solve(const JointVector& torque, const JointVector& acceleration) noexcept {
-  while (count_ > 0) {  // each time round with a joint less
+  while (count_ > 0) {  // with one joint less each time
     if (!factor_held()) return let_go(count_ - 1);
     Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints, 1> factors(count_);
     for (Eigen::Index k = 0; k < count_; ++k) {
@@ -433,7 +433,7 @@ void Brake::solve(const JointVector& torque, const JointVector& acceleration) no
       factors[k] = held(k).scale * (bound.value - free[bound.joint]);
     }
     constrained_.solveInPlace(factors);
-    double share = 1;  // of the way there, before a joint would begin to be driven
+    double share = 1;  // of the way to the factors, up to where a joint would be driven
     Eigen::Index first = -1;
     for (Eigen::Index k = 0; k < count_; ++k) {
       const double from = held(k).factor, to = factors[k];

@@ -7,19 +7,19 @@
 namespace dashpot::controller {
 namespace {
 
-// For frozen(): friction turns round with the motion, so that torque may change by twice as much.
+// For frozen(): friction reverses with the motion, so that torque may change by twice as much.
 constexpr double kStiction = 0.05;     // of the torque limit, beside
-constexpr double kPerCoulomb = 3;      // times the friction of the model: it sticks harder
-constexpr double kAnyStiction = 0.15;  // of the torque limit, where the model knows of none
-constexpr double kCounts = 1.5;        // of an encoder: so far it may be before the next one shows
+constexpr double kPerCoulomb = 3;      // times the friction of the model: stiction is larger
+constexpr double kAnyStiction = 0.15;  // of the torque limit, if the model has no friction
+constexpr double kCounts = 1.5;        // of an encoder: the largest motion that it does not show
 // For gains():
-constexpr double kUndone = 0.4;     // of what the torque is to do: masses and rotors that are wrong
-constexpr double kUnweighed = 0.3;  // of the weight
-constexpr double kHand = 35;        // N, at the tip: a push, or 3 kg that nobody knows of
-constexpr double kFast = 0.5;       // of velocity limits: slower is what somebody pushes
-constexpr double kFastLeast = 1;    // rad/s, or m/s: as fast as a hand pushes, be the limit low
+constexpr double kUndone = 0.4;        // of the torque's power: wrong masses and rotors
+constexpr double kUnweighed = 0.3;     // of the weight
+constexpr double kHand = 35;           // N, at the tip: a push, or an unknown payload of 3 kg
+constexpr double kFast = 0.5;          // of velocity limits: a pushed arm is slower
+constexpr double kFastLeast = 1;       // rad/s, or m/s: the speed of a pushing hand
 constexpr double kForgotten = 0.05;    // s
-constexpr double kLongestBlow = 0.03;  // s: a blow ends sooner, what a motor lacks goes on
+constexpr double kLongestBlow = 0.03;  // s: a blow ends sooner, a weak motor does not
 
 }  // namespace
 
@@ -85,7 +85,7 @@ Status MotionWatch::check(const Tick& tick) noexcept {
   const bool gained = gains(tick);
   if (frozen(tick)) {
     status = Status::kStateFrozen;
-    energy_ = -1;  // which the velocity does not tell
+    energy_ = -1;  // unknown from this velocity
   } else if (gained) {
     status = Status::kBrakeDoubted;
   }
@@ -127,10 +127,10 @@ bool MotionWatch::collides(const Tick& tick) noexcept {
   const double share = std::min(1.0, tick.dt / kTimeConstant);
   for (Eigen::Index i = 0; i < n_; ++i) {
     Record& joint = this->joint(i);
-    const double weight = gravity_ ? tick.robot.gravity[i] : 0;  // or the robot holds it itself
+    const double weight = gravity_ ? tick.robot.gravity[i] : 0;  // or held by the robot
     const double now = force[i] + tick.robot.coriolis[i] + weight - joint.torque;
     joint.external += share * (now - joint.external);
-    found |= !(std::abs(joint.external) <= joint.external_limit);  // or it is no number
+    found |= !(std::abs(joint.external) <= joint.external_limit);  // also if it is NaN
   }
   return found;
 }
@@ -149,9 +149,9 @@ bool MotionWatch::Record::grows(double now, bool still) noexcept {
 }
 
 bool MotionWatch::Record::vibrates(double now, double dt, double share) noexcept {
-  constexpr double kHigh = 0.18;     // of the velocity limit: `slow` takes some of a fifth
+  constexpr double kHigh = 0.18;     // of the velocity limit: of a fifth, `slow` takes a part
   constexpr double kLongest = 0.09;  // s, of a half swing: 5.6 Hz
-  constexpr double kEnough = 0.4;    // s; what is struck decays sooner
+  constexpr double kEnough = 0.4;    // s; the vibration after a blow decays sooner
   constexpr int kSwings = 10;
   slow += share * (now - slow);
   const double last = fast;
@@ -197,7 +197,7 @@ bool MotionWatch::frozen(const Tick& tick) noexcept {
   }
   strained_ = strained ? strained_ + tick.dt : 0;
   frozen_ |= strained_ >= frozen_after_;
-  return frozen_;  // until the state changes, also where the torque is as before again
+  return frozen_;  // until the state changes, also if the torque returns
 }
 
 bool MotionWatch::gains(const Tick& tick) noexcept {

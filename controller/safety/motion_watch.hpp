@@ -7,8 +7,8 @@
 
 namespace dashpot::controller {
 
-/// Notices what an arm must not go on with: see the statuses that latch. Each tick is given to
-/// `check`, if its state is good, and the torque that comes of it to `applied` in any case.
+/// Notices conditions with which an arm must not continue: the statuses that latch. Each tick with
+/// a good state is passed to `check`, and the torque of every tick to `applied`.
 ///
 /// - kCollision: the external torque r, estimated with a time constant of 10 ms from
 ///       r <- r + T / 10 ms (M (qd - last qd) / T + coriolis + gravity - tau - r),
@@ -20,19 +20,19 @@ namespace dashpot::controller {
 ///   at most 90 ms, whatever the springs do, which is faster than a person shakes; or the torque
 ///   beyond the weight reverses, at more than a twentieth of its limit, in every tick for 40 ticks,
 ///   or in every other tick for 180.
-/// - kStateFrozen: position and velocity stay the same to the last bit although that torque has
-///   changed, since a bit last did, by more than stiction explains, for 0.4 times
-///   Watchdog::feedback; or for 40 ms, in which the velocity would have moved a joint by 0.1 mrad
-///   (0.1 mm) and more than a count of its encoder. Stiction takes up a twentieth of the torque
-///   limit and three times the model's Coulomb friction, or 15 % of the limit where the model has
-///   none.
+/// - kStateFrozen: position and velocity stay the same to the last bit for 0.4 times
+///   Watchdog::feedback
+/// although that torque has since changed by more than stiction explains; or for 40 ms in which the
+/// velocity would have moved a joint by 0.1 mrad (0.1 mm) and more than a count of its encoder.
+/// Stiction is a twentieth of the torque limit and three times the model's Coulomb friction, or 15
+/// % of the limit if the model has no friction.
 /// - kBrakeDoubted: the arm gains energy that the torque does not give it. While no springs act,
 ///       s <- max(0, s + dE - x' qd dt - (0.4 |x_i qd_i| + 0.3 |gravity_i qd_i| + 35 N v_tip) dt),
 ///   E being the kinetic energy and x the torque beside the weight, exceeds the energy of joints
-///   with half of their velocity limits, each by itself, and has grown for 30 ms since: a blow
-///   ends sooner. So motors that are weak, dead or reversed
-///   are found however much gravity explains, and what is wrong by less is not: masses, friction, a
-///   payload, a push by hand. Below that kinetic energy s decays with 50 ms.
+///   with half of their velocity limits, each by itself, and has grown for 30 ms since: a blow ends
+///   sooner. This finds motors that are weak, dead or reversed although gravity explains much, and
+///   ignores wrong masses, friction, a payload and a push by hand, which explain less. Below that
+///   kinetic energy s decays with 50 ms.
 class MotionWatch {
  public:
   MotionWatch(const RobotModel& model, const Settings& settings) noexcept;
@@ -49,10 +49,10 @@ class MotionWatch {
   };
   /// Returns kOk, or the worst of the statuses kCollision to kBrakeDoubted that holds now.
   Status check(const Tick& tick) noexcept;
-  /// Takes note of a torque that is applied beside a weight.
+  /// Records a torque that is applied beside a weight.
   void applied(const JointVector& torque, const JointVector& weight) noexcept;
 
-  /// Swings and reversals are counted anew.
+  /// Counts swings and reversals again from zero.
   void forget_swings() noexcept;
 
   /// True as long as the state is frozen, so that its velocity means nothing.
@@ -76,9 +76,9 @@ class MotionWatch {
     double stiction;        ///< change of torque that it may take up, N m
     double external_limit;  ///< N m
 
-    double count = 2e-3;  ///< least change of q that was seen, as of a 12-bit encoder at first, rad
-    double q = 0, qd = 0;            ///< of the last tick
-    double torque = 0, beside = 0;   ///< applied since, the mean, and that beside the weight
+    double count = 2e-3;   ///< least observed change of q, rad; at first a 12-bit encoder's
+    double q = 0, qd = 0;  ///< of the last tick
+    double torque = 0, beside = 0;   ///< applied since, the mean, and its part beside the weight
     double excess = 0;               ///< of the torque over the weight, applied since
     double before = 0;               ///< excess when the state was last seen to change
     double external = 0;             ///< r
@@ -86,13 +86,13 @@ class MotionWatch {
     double reversals = 0;            ///< share of the last ticks
     int grown = 0;                   ///< half swings, one larger than the other
     double slow = 0, fast = 0;       ///< qd, smoothed over 50 ms, and the rest of it
-    double swing = 0, height = 0;    ///< how long this half swing of `fast` has been, and how high
+    double swing = 0, height = 0;    ///< duration and height of this half swing of `fast`
     double vibrating = 0;            ///< for how long half swings have been fast and high, s
-    int swings = 0;                  ///< how many these were
+    int swings = 0;                  ///< number of these half swings
 
-    /// Counts half swings. True if the joint swings with a velocity that grows.
+    /// Counts half swings. Returns true if the joint swings with a growing velocity.
     bool grows(double now, bool still) noexcept;
-    /// True if the joint vibrates; `slow` goes by a `share` of the way to qd.
+    /// Returns true if the joint vibrates; `slow` moves by a `share` of the way to qd.
     bool vibrates(double now, double dt, double share) noexcept;
   };
   Record& joint(Eigen::Index i) noexcept { return joints_[static_cast<std::size_t>(i)]; }
@@ -105,13 +105,13 @@ class MotionWatch {
   double frozen_after_;
   bool first_ = true;
   bool frozen_ = false;
-  int torques_ = 0;  ///< how many were applied since the last tick
+  int torques_ = 0;  ///< number applied since the last tick
   double tip_speed_ = 0;
-  double same_ = 0;      ///< for how long the state has not changed, s
-  double strained_ = 0;  ///< for how long, meanwhile, the torque has exceeded stiction, s
+  double same_ = 0;      ///< time since the state changed, s
+  double strained_ = 0;  ///< part of it in which the torque exceeded stiction, s
   double energy_ = -1;   ///< kinetic, J; negative: the last tick had springs
   double gained_ = 0;    ///< s, J
-  double gaining_ = 0;   ///< for how long it has been too large and has grown, s
+  double gaining_ = 0;   ///< time for which s_ was too large and grew, s
   std::size_t wall_count_;
   std::array<Record, kMaxJoints> joints_;
   std::array<Wall, kMaxWalls> walls_;

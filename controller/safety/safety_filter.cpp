@@ -11,9 +11,9 @@ constexpr double kRampTime = 0.1;     // s
 constexpr double kLeastRoom = 0.05;   // of a torque limit
 constexpr double kSprings = 0.8;      // of the torque beside the weight: the rest is for dampers
 constexpr double kReturnRise = 1;     // s
-constexpr double kLongestFade = 0.3;  // s: a brake is watched from then on, whatever fades
+constexpr double kLongestFade = 0.3;  // s: after it a brake is watched even during a fade
 constexpr double kFull = 0.9;         // of the tip's speed limit: nothing drives further
-constexpr double kWholly = 0.65;      // from here on the drive is taken away
+constexpr double kWholly = 0.65;      // from here on driving torque is scaled down
 constexpr double kMoves = 0.05;       // of a velocity limit: torque that drives ends at once
 
 }  // namespace
@@ -129,7 +129,7 @@ double SafetyFilter::fitting(const JointVector& base, const JointVector& part,
                              double most) const noexcept {
   double share = 1;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    // A joint whose weight is about at its limit has little say: `limit` clips what is left of it.
+    // A joint whose weight is about at its limit counts little: `limit` clips its remaining torque.
     const double room = std::max(most * (joint(i).torque - std::copysign(1, part[i]) * base[i]),
                                  kLeastRoom * joint(i).torque);
     if (share * std::abs(part[i]) > room) share = room / std::abs(part[i]);

@@ -5,34 +5,35 @@
 
 namespace dashpot::controller {
 
-/// The last stop of every torque. With w the weight (the gravity torque that the controller
+/// The last check of every torque. With w the weight (the gravity torque that the controller
 /// compensates, n) the torque is
 ///     tau = w + b + x,       x = f(law's torque - w),
-/// b being what stops the arm where no springs are in force (see Brake::stop), and keeps
+/// b being the brake while no springs act (see Brake::stop), and keeps
 ///     |tau_i| <= torque_i   and   |tau_i - last tau_i| <= torque_rate_i T.
 ///
-/// f, in this order, while springs are in force:
+/// f, in this order, while springs act:
 /// - x shrinks evenly by (0.9 - v) / 0.25 where it adds energy (x' qd > 0) to a robot whose tip
 ///   moves with the share v > 0.65 of its limit, and to the power Limits::power.
-/// - Springs, and all that is no damper, shrink evenly, in all joints alike, to 0.8 of the torque
-///   that the weight leaves: the wrench at the tip keeps its direction. Dampers shrink evenly to
-///   all of it, and the sum is clipped. So an arm that presses too hard stays damped: if springs
-///   took all that is left, the torque of a joint at its limit would not change with its velocity.
-/// - Brake::hold takes away what would take a joint out of its interval of allowed velocity.
+/// - Springs and all other torques but dampers shrink evenly, in all joints alike, to 0.8 of the
+///   torque
+/// that the weight leaves: the wrench at the tip keeps its direction. Dampers shrink evenly to all
+/// of it, and the sum is clipped. So an arm that presses too hard stays damped: without this
+/// reserve the torque of a joint at its limit would not change with its velocity.
+/// - Brake::hold takes away torque that would move a joint out of its interval of allowed velocity.
 ///
-/// Where springs end or start again, x goes from what acts to what is asked for evenly: by the same
-/// share of the way in all joints, the largest in which no joint's rate limit has to act on it.
+/// When springs end or start again, x goes evenly from the acting to the requested torque: by the
+/// same share of the way in all joints, the largest with which no joint's rate limit acts on it.
 /// Otherwise joints with little torque would let go first, and turn the wrench that the tip exerts.
 /// It takes as many ticks as the joint with the longest way needed at first. The brake does not
-/// wait for it, nor does what drives a joint that moves where no springs are in force.
+/// wait for it, nor does torque against the motion of a joint while no springs act.
 class SafetyFilter {
  public:
   /// What the arm is to do.
   enum class Aim : std::uint8_t {
-    kSprings,  ///< what the law says
+    kSprings,  ///< the torque of the law
     kStop,     ///< stop
     kReturn,   ///< stop, but joints outside their position limits come back
-    kBlind,    ///< stop, by what the model says: nobody sees the motion
+    kBlind,    ///< stop, with the motion predicted by the model
     kFloat,    ///< nothing: the weight alone
   };
 
@@ -43,11 +44,11 @@ class SafetyFilter {
   void restart() noexcept;
   /// Forgets the past; `torque` is what acts now.
   void reset(const JointVector& torque) noexcept;
-  /// As long as nothing is known of the torque that acts: it is the weight.
+  /// Starts from the weight while the acting torque is unknown.
   void assume(const JointVector& weight) noexcept {
     if (!known_) reset(weight);
   }
-  /// The next torque to be applied does not continue the last: the difference fades evenly.
+  /// Makes the next torque fade evenly from the last one instead of continuing it.
   void begin_anew() noexcept { anew_ = true; }
 
   /// Sets the limit of the tip's speed, m/s, above zero.
@@ -61,18 +62,17 @@ class SafetyFilter {
 
   /// Sets the last torque again.
   void repeat(JointVector& tau) noexcept {
-    known_ = true;  // what it puts out is what acts
+    known_ = true;  // its output is the acting torque
     tau = last_;
   }
-  /// Where nothing is known: the last torque goes evenly to zero within 0.1 s, or as fast as the
-  /// rate limits allow.
+  /// Takes the last torque evenly to zero within 0.1 s, or as fast as the rate limits allow.
   void ramp(JointVector& tau) noexcept;
 
-  /// Returns what the last `apply` was given, before the limits.
+  /// Returns the input of the last `apply`, before the limits.
   const JointVector& asked() const noexcept { return asked_; }
-  /// Returns what the last `apply` or `ramp` put out.
+  /// Returns the output of the last `apply` or `ramp`.
   const JointVector& last() const noexcept { return last_; }
-  /// True while what acted when springs ended or started goes over into what is asked for.
+  /// True during the fade after springs ended or started.
   bool fades() const noexcept { return anew_ || fading_; }
   Brake& brake() noexcept { return brake_; }
 
@@ -90,18 +90,18 @@ class SafetyFilter {
   const Bounds& joint(Eigen::Index i) const noexcept {
     return joints_[static_cast<std::size_t>(i)];
   }
-  /// Scales what drives a robot whose tip is fast, and what gives too much power. True if it did.
+  /// Scales torque that drives a robot whose tip is fast, or gives too much power. True if it did.
   bool hold_back(const JointVector& qd, double tip_speed, JointVector& excess) const noexcept;
   /// Fits `excess` into the torque limits beside `base`, dampers first. True if it was too large.
   bool share_out(const JointVector& base, const JointVector& dampers,
                  JointVector& excess) const noexcept;
   /// Returns the share of `part` for which there is room beside `base`, at most 1.
   double fitting(const JointVector& base, const JointVector& part, double most) const noexcept;
-  /// Splits the last torque into `weight`, the brake in `base` as far as it acted already, and what
-  /// fades.
+  /// Splits the last torque into `weight`, the acting part of the brake in `base`, and the part
+  /// that fades.
   void take_over(const JointVector& base, const JointVector& weight) noexcept;
-  /// Moves from the excess that acts toward `excess`, within the torque limits beyond `base`, and
-  /// returns it there. True if there is a way left.
+  /// Moves from the acting excess toward `excess`, within the torque limits beyond `base`, and
+  /// returns it there. True if the fade is not at its end.
   bool fade(const JointVector& qd, bool springs, const JointVector& base,
             JointVector& excess) noexcept;
   /// Bounds the finite `tau` and its change, and remembers it. True if that changed it.
@@ -114,13 +114,13 @@ class SafetyFilter {
   double ramp_share_;  ///< of the torque, in one tick
   double return_step_;
   double longest_fade_;   ///< ticks
-  double stopping_ = 0;   ///< for how many ticks no springs have acted
+  double stopping_ = 0;   ///< number of ticks without springs
   double returning_ = 0;  ///< share of the return velocity
   bool known_ = false;
   bool ramping_ = false;
   bool anew_ = true;
   bool fading_ = false;
-  double fade_ticks_ = 0;  ///< for how many more, 0 before the first
+  double fade_ticks_ = 0;  ///< remaining ticks, 0 before the first
   JointVector last_;
   JointVector asked_;
   alignas(64) std::array<Bounds, kMaxJoints> joints_;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLargestGain = 1e9;
 
-/// Almost always the bits are equal, which takes a tenth of the time of comparing numbers.
+/// Almost always the bits are equal, which takes a tenth of the time of a comparison of numbers.
 template <class Matrix>
 bool same(const Matrix& a, const Matrix& b) noexcept {
   if (a.rows() != b.rows() || a.cols() != b.cols()) return false;
@@ -33,7 +33,7 @@ bool positive_semidefinite(Matrix A, double slack) noexcept {
   return true;
 }
 
-/// Reason why `A` is no n x n stiffness or damping, or null.
+/// Returns the reason why `A` is not an n x n stiffness or damping, or null.
 template <class Matrix>
 const char* matrix_fault(const Matrix& A, Eigen::Index n) noexcept {
   if (A.rows() != n || A.cols() != n) return "is not n x n for the robot's n joints";

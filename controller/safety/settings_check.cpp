@@ -62,7 +62,7 @@ class RangeCheck {
   Eigen::Index n_;
 };
 
-/// The unit in which a number may be meant that is too large in `unit`, and how large it is there.
+/// The unit in which a number that is too large in `unit` was probably meant, and its size there.
 struct OtherUnit {
   std::string_view unit, meant;
   double size;
@@ -76,11 +76,11 @@ constexpr std::array<OtherUnit, 8> kOtherUnits = {{{"rad", "deg", std::numbers::
                                                    {"m/s", "mm/s", 1e-3},
                                                    {"s", "ms", 1e-3}}};
 
-/// Refuses what is beyond the model's limits, or what no arm of its size needs.
+/// Refuses values beyond the model's limits, and values that no arm of its size needs.
 class ScaleCheck {
  public:
   explicit ScaleCheck(const RobotModel& model) : model_(model) {
-    double along = 0, around = 0, power = 0;  // m/s, rad/s, W, if all joints did what they may
+    double along = 0, around = 0, power = 0;  // m/s, rad/s, W, with all joints at their limits
     const double reach = reach_of(kdl_chain(model), model.joints());
     for (const Joint& joint : model.joints()) {
       const bool slides = joint.type == JointType::kPrismatic;
@@ -237,7 +237,7 @@ std::vector<std::string> doubtful_gains(const RobotModel& model, const Gains& ga
 
 std::vector<std::string> doubtful_gains(double reach, const Gains& gains,
                                         const std::vector<Joint>& joints) {
-  constexpr double kFirm = 100;  // N m/rad: joints of less may move little enough
+  constexpr double kFirm = 100;  // N m/rad: weaker joints may carry little
   const Vector6 K = gains.task_stiffness.diagonal(), D = gains.task_damping.diagonal();
   const bool damped = gains.task_damping_ratio == 0;
   std::vector<std::string> said;
@@ -276,8 +276,8 @@ void validate(const Settings& settings, const RobotModel& model) {
   const JointVector& torque = settings.limits.torque;
   if (torque.size() == n && torque.isZero(0) && lacks_efforts(model)) {
     throw InvalidSettings("limits.torque",
-                          "missing: no joint of the model has a limit of effort (0 is none); "
-                          "write what each joint gives, N m");
+                          "missing: no joint of the model has a limit of effort (0 means no "
+                          "limit); set the torque of each joint, N m");
   }
   for_each_setting(settings, RangeCheck(n));
   if (!settings.limits.beyond_model) for_each_setting(settings, ScaleCheck(model));
@@ -296,25 +296,25 @@ void validate(const Settings& settings, const RobotModel& model) {
     const double distance = wall.distance(Eigen::Vector3d::Zero());
     if (limits.beyond_model || std::abs(distance) <= far) continue;
     fail("limits.walls", std::abs(distance), "m",
-         "from the base, farther than the arm reaches; is its point in mm? "
+         "from the base, beyond the arm's reach; is its point in mm? "
          "limits.beyond_model: true accepts it");
   }
   const Watchdog& watchdog = settings.watchdog;
   if (watchdog.setpoint_damp > 0 && watchdog.setpoint_damp < watchdog.setpoint_hold) {
     fail("watchdog.setpoint_damp", watchdog.setpoint_damp, "s",
          "before setpoint_hold, " + text::number(watchdog.setpoint_hold) +
-             " s, which would never come");
+             " s, so that hold would never act");
   }
   if (!(settings.watchdog.longest_gap > settings.period)) {
     fail("watchdog.longest_gap", settings.watchdog.longest_gap, "s", "has to exceed the period");
   }
   const double stopping = Brake(settings).stopping_time();
-  const bool late = loop_lag(settings) > 2 * settings.period;  // and not merely a slow loop
+  const bool late = loop_lag(settings) > 2 * settings.period;  // not only a slow loop
   if (late && stopping > std::max(kLongStop, 1.01 * limits.stopping_time)) {
     fail("limits.stopping_time", limits.stopping_time, "s",
          "but a loop whose torque is " + text::number(loop_lag(settings)) +
              " s late (analysis.sampled) needs " + text::number(stopping) +
-             " s: ask for that, or for less delay and a higher cutoff");
+             " s: set that, or less delay and a higher cutoff");
   }
   check_initial(settings.initial, n);
 }

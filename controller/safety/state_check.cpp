@@ -8,21 +8,21 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kFarthest = 1e6;  // rad (m): no joint gets there, and turns cannot be told there
+constexpr double kFarthest = 1e6;  // rad (m): beyond any joint; turns would be lost in rounding
 // For follows():
 constexpr double kFaster = 2;         // times a velocity limit: a robot may exceed it a little
 constexpr double kResolution = 1e-3;  // rad (m): coarse encoders
-constexpr double kApart = 0.5;        // of the larger velocity: what a blow within a tick explains
+constexpr double kApart = 0.5;        // of the larger velocity: explained by a blow within a tick
 constexpr double kJolt = 0.5;         // of a velocity limit, at once: noise, and hard drives
 constexpr double kJoltRate = 10;      // of a velocity limit in a second
-constexpr double kBlow = 3;           // a third of a change of velocity has to show in the position
+constexpr double kBlow = 3;           // a third of a velocity change has to show in the position
 
 // For wrong_rate(): long enough for the jitter of a loop that is not in real time.
 constexpr int kIntervals = 50;
 constexpr double kFastest = -1.0 / 3, kSlowest = 0.5;  // mean interval / period - 1
 // For contradictory(): in half a second a joint at a hundredth of its usual speed moves further
 // than the tolerance, and no filter of velocities lags behind for so long.
-constexpr double kUnexplained = 0.3;       // of what was travelled
+constexpr double kUnexplained = 0.3;       // of the travelled distance
 constexpr double kAngleTolerance = 0.02;   // rad
 constexpr double kSlideTolerance = 0.005;  // m
 
@@ -71,7 +71,7 @@ void StateCheck::forget_motion() noexcept {
 }
 
 double StateCheck::counted(double gap) noexcept {
-  constexpr double kLeast = 0.1;  // of a period: jitter of a loop that is not in real time is less
+  constexpr double kLeast = 0.1;  // of a period: jitter outside real time is smaller
   const bool says_nothing = gap < kLeast * period_;
   const double left = gap - (says_nothing ? 0 : ahead_);
   ahead_ = says_nothing ? ahead_ + period_ : 0;
@@ -114,7 +114,7 @@ Status StateCheck::check(const RobotState& state) noexcept {
   }
   const JointVector& position = unwraps ? unwrapped : state.position;
   if (good_.any && (relocated || good_.age > longest_gap_)) {
-    if (blind_) velocity_.setZero();  // how fast a jump was means nothing
+    if (blind_) velocity_.setZero();  // the speed of a jump has no meaning
     forget_motion();
     intervals_ = 0;
     if (gap > longest_gap_) status = Status::kTimeGap;
@@ -131,8 +131,8 @@ Status StateCheck::check(const RobotState& state) noexcept {
 Status StateCheck::compare(const JointVector& position, const JointVector& velocity,
                            double gap) noexcept {
   const bool contradicts = contradictory(position, velocity);
-  // What is smoothed begins with how fast the position changes: it does not pass through zero where
-  // the velocity has the wrong sign.
+  // The smoothed velocity begins with the change of position, so that it does not pass through zero
+  // if the velocity has the wrong sign.
   if (contradicts && !blind_) velocity_ = (position - good_.position) / good_.age;
   blind_ |= contradicts;
   const bool wrong = !contradicts && wrong_rate(gap);
@@ -166,7 +166,7 @@ bool StateCheck::follows(const Last& last, const RobotState& state) const noexce
   for (Eigen::Index i = 0; i < n_; ++i) {
     const double limit = velocity_limit_[i];
     const double before = last.velocity[i], now = state.velocity[i];
-    double position = state.position[i];  // as `check` takes it
+    double position = state.position[i];  // as in `check`
     if (std::abs(position) > kFarthest) return false;
     if (any_continuous_ && continuous_[static_cast<std::size_t>(i)]) {
       position += whole_turns(last.position[i] - position);

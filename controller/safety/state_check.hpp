@@ -7,30 +7,30 @@
 
 namespace dashpot::controller {
 
-/// Tells states that a robot can be in from those that only a broken sensor, link or clock reports.
+/// Separates states that a robot can have from reports of a broken sensor, link or clock.
 ///
 /// A state is compared with the last good one, t seconds older. A position may differ by
 ///
 ///     2 velocity_i t + 0.001 rad,
 ///
-/// velocity_i being the limit of the settings or the robot's own, whichever is higher; or by what
-/// the measured velocities say, the mean of the two times t, give or take half of the larger one
-/// times t and 0.001 rad: a robot that is faster than its limit is no broken sensor. A velocity may
-/// differ by velocity_i (1/2 + 10/s t), or by any amount that the position agrees with: at least a
-/// third of the way from where the old velocity leads to where the new one does. So a blow is no
-/// broken sensor either.
+/// velocity_i being the limit of the settings or the robot's own, whichever is higher; or by the
+/// motion of the measured velocities, the mean of the two times t, give or take half of the larger
+/// one times t and 0.001 rad: a robot above its velocity limit does not have a broken sensor. A
+/// velocity may differ by velocity_i (1/2 + 10/s t), or by any amount with which the position
+/// agrees: at least a third of the way from the old velocity's position to the new one's. This
+/// tolerates a blow.
 ///
 /// States that agree with each other in this way for 20 ms (or longest_gap, if that is longer) are
 /// followed, even if they do not agree with the last good one; others at the latest when t has
 /// grown enough. By then a fault has latched (see Status), because the jump took longer than
 /// longest_gap.
 ///
-/// A time stamp that is not after the last one, or by less than a tenth of a period, says nothing:
-/// it counts as a period, and so does what the next one says less.
+/// A time stamp that is not after the last one, or by less than a tenth of a period, is ignored: it
+/// counts as a period, and the next stamp counts as much less.
 ///
-/// Good states are compared with each other over about Watchdog::feedback: what the positions moved
-/// by against what the velocities say, and the time stamps against the period. See
-/// kStateContradictory and kWrongRate.
+/// Good states are compared with each other over about Watchdog::feedback: the change of the
+/// positions with the velocities, and the time stamps with the period. See kStateContradictory and
+/// kWrongRate.
 ///
 /// A continuous joint may report its angle modulo 2 pi: `position` follows it without jumps. For
 /// any other joint a wrap is a jump.
@@ -45,15 +45,15 @@ class StateCheck {
   /// Returns the last good position, n, rad.
   const JointVector& position() const noexcept { return good_.position; }
   /// Returns the last good velocity, n, rad/s: the measured one, or, from a contradiction on until
-  /// `trust_velocities`, how fast positions change, smoothed over three ticks.
+  /// `trust_velocities`, the rate of change of the positions, smoothed over three ticks.
   const JointVector& velocity() const noexcept { return blind_ ? velocity_ : good_.velocity; }
-  /// Returns how long before the last state the last good one before it was, s.
+  /// Returns the time from the good state before the last state to the last state, s.
   double age() const noexcept { return age_; }
   /// Returns for how long time stamps have not gone forward, s.
   double backward() const noexcept { return backward_; }
-  /// Velocities are measured again, after a contradiction.
+  /// Uses measured velocities again, after a contradiction.
   void trust_velocities() noexcept { blind_ = false; }
-  /// The next state is like the first.
+  /// Makes the next state count as the first.
   void reset() noexcept;
 
  private:
@@ -65,7 +65,7 @@ class StateCheck {
     JointVector velocity;
   };
 
-  /// Returns how much time counts as passed where time stamps differ by `gap`, s.
+  /// Returns the time that counts as passed if time stamps differ by `gap`, s.
   double counted(double gap) noexcept;
   bool follows(const Last& last, const RobotState& state) const noexcept;
   /// True if this state and those before have agreed with each other for long enough.
@@ -74,7 +74,7 @@ class StateCheck {
   bool wrong_rate(double gap) noexcept;
   /// Compares a good state with the one before. Returns kOk, kStateContradictory or kWrongRate.
   Status compare(const JointVector& position, const JointVector& velocity, double gap) noexcept;
-  /// True if positions have lately moved otherwise than the velocities say.
+  /// True if positions have lately contradicted the velocities.
   bool contradictory(const JointVector& position, const JointVector& velocity) noexcept;
   void forget_motion() noexcept;
 
@@ -91,17 +91,17 @@ class StateCheck {
   std::int64_t last_time_ = 0;
   double age_ = 0;
   double backward_ = 0;
-  double ahead_ = 0;  ///< how much more was counted than the time stamps said, s
+  double ahead_ = 0;  ///< counted time less the time of the stamps, s
   Last good_;
   Last doubtful_;         ///< since the last good one
-  double agreement_ = 0;  ///< for how long the doubtful ones have agreed with each other, s
+  double agreement_ = 0;  ///< time for which the doubtful ones have agreed, s
 
   JointVector velocity_;     ///< from positions, while blind_
   bool blind_ = false;       ///< the measured velocities contradicted the positions
   int intervals_ = 0;        ///< between ticks that `wrong_rate` has seen, at most kIntervals
   double excess_ = 0;        ///< mean of interval / period - 1
-  JointVector unexplained_;  ///< what the positions moved beyond the velocities, lately, rad
-  JointVector travelled_;    ///< the larger of what both moved, lately, rad
+  JointVector unexplained_;  ///< recent motion not explained by the velocities, rad
+  JointVector travelled_;    ///< the larger of both recent motions, rad
 };
 
 /// Returns seconds from `earlier` to `later`, in ns each, of any size.

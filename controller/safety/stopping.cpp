@@ -11,7 +11,7 @@ namespace dashpot::controller {
 namespace {
 
 constexpr double kStopBegins = 0.9;     // of a velocity limit
-constexpr double kStopEnds = 0.1;       // of what it began with
+constexpr double kStopEnds = 0.1;       // of the initial velocity
 constexpr double kLongestStop = 2;      // s
 constexpr double kPromisedStop = 0.25;  // s: docs/safety.md
 constexpr double kSlowerStop = 1.5;     // times the stop with faster torques
@@ -59,7 +59,7 @@ std::string slow_stop(const RobotModel& model, const Settings& settings, const J
     return stopping(model, faster, q).time[slowest];
   };
   const double best = with_rate(kFastestRate);
-  if (time <= kSlowerStop * best) return "";  // that of the torque limits, or a brake that is soft
+  if (time <= kSlowerStop * best) return "";  // limited by torque, or by a soft brake
   double times = 2;
   while (times < kFastestRate && with_rate(times) > std::max(kPromisedStop, kSlowerStop * best))
     times *= 2;

@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 constexpr double kLargestAngle = 2;  // rad
 
-/// The e with K e = F; zero in directions without springs.
+/// The e with K e = F, zero in directions without springs.
 Vector6 deflection(const Matrix6& K, const Vector6& F) noexcept {
   constexpr double kNothing = 1e-10;
   Vector6 scale;  // metres and radians have springs of their own size
@@ -43,7 +43,7 @@ Matrix3d derivative_of_error(const Vector3d& e) noexcept {
   return Matrix3d::Identity() + 0.5 * cross + c * cross * cross;
 }
 
-/// K += what a load adds to the stiffness of posture springs `k`. `e` is the tip's error, and `A`
+/// K += the load's part of the stiffness of posture springs `k`. `e` is the tip's error, and `A`
 /// its derivative_of_error.
 void add_loaded_posture(const LoadedPosture& posture, const Jacobian& J, const JointVector& k,
                         const Vector6& e, const Matrix3d& A, JointMatrix& K) noexcept {
@@ -52,7 +52,7 @@ void add_loaded_posture(const LoadedPosture& posture, const Jacobian& J, const J
   const JointVector x = change.share() * e;
   const double s = 1 / std::sqrt(1 + product(x, x) / (kPostureShare * kPostureShare));
   JointMatrix dx = change.of_joint_velocity(e);
-  Jacobian moved(6, n);  // the change of e, as far as J# e does not turn with it
+  Jacobian moved(6, n);  // the change of e for a constant J#
   for (Index j = 0; j < n; ++j) {
     moved.col(j) << -J.col(j).head<3>(), -(A * J.col(j).tail<3>());
     moved.col(j) -= change.turning(e, j);
@@ -107,7 +107,7 @@ JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& i
   const Matrix6 K_C = K_B + K_T;
   const Vector6 wanted = -impedance.task_weight * (wrenches.world + wrenches.commanded);
   Vector6 e = deflection(K_C, wanted);
-  const Vector6 F = K_C * e;  // what K_C can hold
+  const Vector6 F = K_C * e;  // the part that K_C can hold
   const double angle = e.tail<3>().norm();
   if (angle > kLargestAngle) e.tail<3>() *= kLargestAngle / angle;
   const Matrix3d A = derivative_of_error(e.tail<3>());

@@ -10,7 +10,7 @@ namespace dashpot::controller {
 /// M, C and a factor W of K = W' W with at most n rows that moves as smoothly as the robot does. K
 /// itself is not formed, and nothing is squared.
 ///
-/// W stacks the rows of the springs that there are:
+/// W stacks the rows of the springs that are present:
 ///     F' J              K_C = F F' in the axes in which it is given, J turned into them,
 ///     G' (L Q)'         the null space: with M = L L', Q (n x r) spans the free motions in energy
 ///                       coordinates, G G' = Q' L^-1 K_0 L^-T Q,

@@ -6,21 +6,21 @@
 
 namespace dashpot::controller {
 
-/// How the null space's projector N' and J# = M^-1 J' (J M^-1 J')^-1 change with q, where no gains
-/// change. With G = H (H J M^-1 J' H)^-1 H of the selected
-/// directions H, dJ_k = dJ/dq_k and dM_k = dM/dq_k,
+/// Changes of the null space's projector N' and of J# = M^-1 J' (J M^-1 J')^-1 with q, while gains
+/// are constant. With G = H (H J M^-1 J' H)^-1 H of the selected directions H, dJ_k = dJ/dq_k and
+/// dM_k = dM/dq_k,
 ///     d(J# V)/dq_k = M^-1 N' (dJ_k' G V - dM_k J# V) - J# dJ_k J# V
 ///     d(N' t)/dq_k = -N' dJ_k' h - J' G dJ_k z + (1 - N') dM_k z,    h = J#' t, z = M^-1 N' t.
-/// Where the arm is nearly singular, G changes by -S_k = -TaskInertia::spread as well, which adds
+/// If the arm is nearly singular, G changes by -S_k = -TaskInertia::spread as well, which adds
 ///     -M^-1 J' S_k V    and    J' S_k J M^-1 t.
-/// Of the kinematic projector M is I, and dM_k zero.
-/// Where the selected directions turn with the tool, dJ_k is less by the turning of J's rows.
+/// For the kinematic projector M is I, and dM_k is zero. If the selected directions turn with the
+/// tool, the turning of J's rows is subtracted from dJ_k.
 class NullSpaceChange {
  public:
   using TipMatrix = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, kMaxJoints, 6>;
 
-  /// `robot` and `null_space` are those of the kernel at `q`, whose projector or the dynamic one it
-  /// is.
+  /// `robot` and `null_space` come from the kernel at `q`. The projector is the one of `null_space`
+  /// or the dynamic one.
   NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q, const DynamicsResult& robot,
                   const NullSpace& null_space, bool in_tool_axes, bool kinematic) noexcept;
 
@@ -28,7 +28,7 @@ class NullSpaceChange {
   JointMatrix of_joint_velocity(const Vector6& V) const noexcept;
   /// Returns d(N' t)/dq, n x n, for constant t.
   JointMatrix of_torque(const JointVector& t) const noexcept;
-  /// Returns what turns V, constant in the axes of the selected directions, as joint k moves.
+  /// Returns the change of V, constant in the axes of the selected directions, as joint k moves.
   Vector6 turning(const Vector6& V, Eigen::Index k) const noexcept;
   /// Returns d(J x)/dq (6 x n) for constant x, in the axes of the selected directions.
   Jacobian twists(const JointVector& x) const noexcept;

@@ -16,7 +16,7 @@ const Joint& joint_of(const RobotModel& model, int i) {
   return model.joints()[static_cast<std::size_t>(i)];
 }
 
-/// Two digits, rounded up: what is told is enough.
+/// Returns two digits, rounded up, as a suggestion needs no more.
 std::string rounded_up(double value) {
   const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
   return text::number(unit * std::ceil(value / unit - 1e-9), 2);
@@ -133,7 +133,7 @@ std::string rotors_hint(const RobotModel& model, const std::string& inertia_opti
                      " takes the inertia of rotor and gear at the joint (rotor times gear ratio "
                      "squared):" +
                      between +
-                     "the maker tells it, `armature` of a MuJoCo model, or dashpot calibrate.";
+                     "from the maker, `armature` of a MuJoCo model, or dashpot calibrate.";
   if (unknown.published == nullptr) {
     std::string names;
     for (const Drives& drives : published_drives()) {

@@ -48,7 +48,7 @@ const SampledVibration* SampledAnalysis::latest() noexcept {
 }
 
 void SampledAnalysis::run() noexcept {
-  // Whoever made the controller may be a real-time thread; this one must not delay it.
+  // The thread that made the controller may be a real-time thread; this one must not delay it.
   const sched_param ordinary{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   while (!stop_.load(std::memory_order_relaxed)) {

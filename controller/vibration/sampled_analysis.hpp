@@ -25,7 +25,7 @@ class SampledAnalysis {
     std::uint64_t resets = 0;  ///< filled in by `hand_over`
     JointVector position;
     analysis::System<kMaxJoints> system;
-    PassivePart passive;   ///< of what the world adds
+    PassivePart passive;   ///< of the surroundings
     JointMatrix integral;  ///< K_I of integral_stiffness; empty: none
     Attachment attachment;
   };

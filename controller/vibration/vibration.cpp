@@ -16,7 +16,7 @@ std::int64_t analysis_budget(const Settings& settings, int coordinates) {
       std::min(share * settings.period * Analysis::kWorkPerSecond, even));
 }
 
-/// Tasks until one that could not be followed is tried within the tick again: at most so many.
+/// Most tasks that wait after a failed task before one is tried within the tick again.
 constexpr int kLongestWait = 64;
 
 }  // namespace
@@ -80,7 +80,7 @@ bool VibrationAnalysis::worth_trying(const VibrationTask& given) noexcept {
   return true;
 }
 
-/// Says that there are no modes yet.
+/// Reports that there are no modes yet.
 void VibrationAnalysis::announce(const VibrationTask& given) noexcept {
   result_.time = given.time;
   result_.tick = given.tick;
@@ -91,7 +91,7 @@ void VibrationAnalysis::announce(const VibrationTask& given) noexcept {
 }
 
 void VibrationAnalysis::repeat(std::int64_t time, std::uint64_t tick) noexcept {
-  if (missed_) {  // it is still where it was put
+  if (missed_) {  // the task is still there
     task().time = time;
     task().tick = tick;
     update();

@@ -13,7 +13,7 @@ class VibrationThread;
 /// Within the tick no more work is done than Analysis::share grants. A task that needs more goes to
 /// the thread, with all that is known of the modes. Until it is solved the status is
 /// analysis::Status::kUnfinished. Then the result has the modes of the task's tick, and the next
-/// tick continues from them if they can be followed. If they cannot, tasks go straight to the
+/// tick continues from them if they can be tracked. If they cannot, tasks go straight to the
 /// thread, and solving one within the tick is tried more and more seldom.
 ///
 /// If no modes are found, the result's status says why, its count is zero, and nothing else is
@@ -23,7 +23,7 @@ class VibrationThread;
 /// change.)
 class VibrationAnalysis {
  public:
-  /// Analyses systems with so many coordinates.
+  /// Analyses systems with this number of coordinates.
   VibrationAnalysis(const Settings& settings, int coordinates);
   ~VibrationAnalysis();
   VibrationAnalysis(const VibrationAnalysis&) = delete;

@@ -14,8 +14,8 @@ struct VibrationTask {
   bool springs = true;                  ///< whether there is any stiffness
   std::uint64_t number = 0;             ///< of this task, counted from 1
   std::uint64_t restarts = 0;           ///< direct solutions asked for so far
-  std::uint64_t resets = 0;             ///< so far; results from before a reset are dropped
-  VibrationCounters counters;           ///< of ticks that needed no task, or only a part of one
+  std::uint64_t resets = 0;             ///< resets so far; earlier results are dropped
+  VibrationCounters counters;           ///< of ticks that needed only a part of a task, or none
 };
 
 /// Finds the modes of one task after the other, each from the modes of the task before.

@@ -20,7 +20,7 @@ VibrationThread::~VibrationThread() {
 }
 
 void VibrationThread::run() noexcept {
-  // Whoever made the controller may be a real-time thread; this one must not delay it.
+  // The thread that made the controller may be a real-time thread; this one must not delay it.
   const sched_param ordinary{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   constexpr int kBusyLooks = 50;

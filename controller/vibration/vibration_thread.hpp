@@ -9,7 +9,7 @@
 namespace dashpot::controller {
 
 /// A thread that solves the latest task. The real-time thread hands tasks over and fetches results
-/// without waiting, locking or calling the system. So nobody wakes this thread, and it looks for
+/// without waiting, locking or calling the system. It does not wake this thread, which looks for
 /// tasks every 200 us, or every 2 ms if there was none for some time.
 class VibrationThread {
  public:

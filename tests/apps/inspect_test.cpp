@@ -180,7 +180,7 @@ TEST(Inspect, WarnsOfWhatIsDoubtful) {
   const Scratch scratch;
   const Outcome outcome = inspect_text(scratch, "type='continuous'", "ixx='90' iyy='90' izz='90'");
   const std::string doubt =
-      "link 'arm': its inertia, 90 kg m^2, with its mass, 1 kg, is that of a body larger than the "
+      "link 'arm': its inertia, 90 kg m^2, with its mass, 1 kg, fits a body larger than the "
       "arm, whose links add up to 0 m: is it in kg m^2?";
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(outcome.err, "warning: " + doubt + "\n");

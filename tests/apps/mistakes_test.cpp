@@ -152,7 +152,7 @@ TEST(Mistakes, OfOneFileForAnotherNameWhatTakesIt) {
   }
   expect_refusal(
       run_program({"inspect", "--urdf", scene("panda"), "--base", "a", "--tip", "b"}),
-      "it has no XML in it; a configuration or scene names one under robot.urdf, and is read by ");
+      "it contains no XML; a configuration or scene names one under robot.urdf, and is read by ");
   expect_refusal(run_program({"analyze", scene("panda")}),
                  ": is a configuration or scene, which dashpot run, ");
   expect_refusal(run_program({"run", example("chain3.yaml")}),
@@ -181,7 +181,7 @@ TEST(Mistakes, InKindsOfFilesAreNamed) {
   }
   expect_refusal(run_program({"inspect", "--urdf", scratch.write("a.yaml", "mass: 1"), "--base",
                               "a", "--tip", "b"}),
-                 "a.yaml: is no robot description: it has no XML in it");
+                 "a.yaml: is not a robot description: it contains no XML");
 }
 
 TEST(Mistakes, OfACommandAreNamedBeforeALoopIsAwaited) {

@@ -61,7 +61,7 @@ TEST(RotorsOfInspect, HaveSourceAndDoubt) {
   expect_refusal(run_program(of_panda("inspect", {"--drives", "pandas"})),
                  "--drives: 'pandas' is not one of panda, fr3");
   expect_refusal(run_program(of_panda("audit", joined(kCrisp, {"--drives", "ur5e"}))),
-                 "--drives: those of ur5e have 6 joints, the arm has 7");
+                 "--drives: ur5e has 6 joints, the arm has 7");
 }
 
 TEST(RotorsOfDesign, AreNamedWhereTheLoopBearsLess) {

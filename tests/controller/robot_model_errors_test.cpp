@@ -85,8 +85,8 @@ TEST(RobotModelErrors, AreOneLineThatNamesTheElement) {
     const char* start;   // after "arm.urdf: "
     const char* reason;  // a part of it
   } cases[] = {
-      {"", "", "is no robot description: it has no XML in it"},
-      {"mass: [[1]]", "", "is no robot description: it has no XML in it"},
+      {"", "", "is not a robot description: it contains no XML"},
+      {"mass: [[1]]", "", "is not a robot description: it contains no XML"},
       {"<robot name='r'><link name='a'", "", ""},
       {"<sdf/>", "is SDF, ", "give the URDF or xacro that it was made from"},
       {"<?xml version='1.0'?><mujoco model='a'/>", "is MJCF, ", "dashpot.Robot.from_mujoco"},
@@ -260,8 +260,8 @@ TEST(RobotModelErrors, SayHowManyJointsCanBeElastic) {
     return std::string("no error");
   };
   EXPECT_EQ(problem(),
-            "arm.urdf: gear stiffness: 10 of 10 joints are elastic, at most 6 of so many can be; "
-            "give the others none");
+            "arm.urdf: gear stiffness: 10 of 10 joints are elastic, at most 6 can be; "
+            "set the others to none");
   options.gear_stiffness.tail(4).setConstant(std::numeric_limits<double>::infinity());
   EXPECT_EQ(problem(), "no error");
 }

@@ -153,7 +153,7 @@ TEST(UrdfForms, WantTorquesWhereNoneIsStated) {
   EXPECT_NO_THROW((void)Controller(model, settings));
   // Where some state one, the others are named, and zeros are no torques that are missing.
   const RobotModel other = read_panda(panda_with("effort=\"87\"", "effort=\"0\""));
-  EXPECT_THAT(other.warnings(), Contains(HasSubstr("(0 is none): panda_joint1: a controller")));
+  EXPECT_THAT(other.warnings(), Contains(HasSubstr("no limit): panda_joint1: a controller")));
   settings.limits.torque.setZero();
   EXPECT_THAT([&] { (void)Controller(other, settings); },
               ThrowsMessage<InvalidSettings>(Not(HasSubstr("missing"))));
@@ -228,10 +228,10 @@ TEST(UrdfForms, AreDoubtedWhereUnitsCannotBeRight) {
     return AllOf(StartsWith("link 'panda_link4': "), HasSubstr(what));
   };
   EXPECT_THAT(warnings(mass, "<mass value='3587.895'/>"),
-              ElementsAre(of_link_4("3588 kg, is 2153 times that of an ordinary link"),
+              ElementsAre(of_link_4("3588 kg, is 2153 times the mass of an ordinary link"),
                           of_link_4("are masses in g")));
   EXPECT_THAT(warnings(mass, "<mass value='4e-4'/>"),
-              ElementsAre(of_link_4("is it in kg?"), of_link_4("of a body larger than the arm")));
+              ElementsAre(of_link_4("is it in kg?"), of_link_4("fits a body larger than the arm")));
   EXPECT_THAT(warnings(mass, "<mass value='1.2'/>"), IsEmpty());
   EXPECT_THAT(warnings("effort=\"87\"", "effort=\"5\""), SizeIs(0)) << "joint 1 holds no weight";
   EXPECT_THAT(
@@ -266,12 +266,12 @@ TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
               o.payload.mass = 1;
               o.payload.center = {0, 0, 50};
             }},
-           {"payload: its mass and inertia are those of a body of 122.5 m",
+           {"payload: its mass and inertia fit a body of 122.5 m",
             [](O& o) {
               o.payload.mass = 1;
               o.payload.inertia = 1e4 * Eigen::Matrix3d::Identity();
             }},
-           {"joint 'panda_joint1': its reflected inertia, 3000 kg m^2, is hardly one of an arm of",
+           {"joint 'panda_joint1': its reflected inertia, 3000 kg m^2, is hardly possible for",
             [](O& o) { o.reflected_inertia.setConstant(7, 3000); }}}) {
     EXPECT_THAT(warnings(change), ::testing::Contains(HasSubstr(said)));
   }
@@ -280,7 +280,7 @@ TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
   EXPECT_THAT(warnings([](O& o) {
                 o.gravity = {0, 0, -1};
               }),
-              ElementsAre("gravity: 1 m/s^2 is that of no planet: is it in m/s^2?"));
+              ElementsAre("gravity: 1 m/s^2 fits no planet: is it in m/s^2?"));
   EXPECT_THAT(warnings([](O& o) {
                 o.tool.position = {0, 0, 0.3};
                 o.payload = {3, {0, 0, 0.1}, 0.01 * Eigen::Matrix3d::Identity()};

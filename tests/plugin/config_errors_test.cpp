@@ -38,9 +38,9 @@ const BadConfig kBadConfigs[] = {
      "gains:\n  joint: {stiffness: 600}\n"},
     {"gains.task.damping: missing; it goes with stiffness (line 2)",
      "gains: {task: {stiffness: [1, 1, 1, 1, 1, 1]}}\n"},
-    {"gains.task.damping_ratio: stands beside damping, in place of which it is meant (line 5)",
+    {"gains.task.damping_ratio: stands beside damping; give only one of them (line 5)",
      "gains:\n  task:\n    damping: [0, 0, 0, 0, 0, 0]\n    damping_ratio: 0.7\n"},
-    {"gains.joint.damping_ratio: stands beside damping, in place of which it is meant (line 5)",
+    {"gains.joint.damping_ratio: stands beside damping; give only one of them (line 5)",
      "gains:\n  joint:\n    damping: 1\n    damping_ratio: 0.7\n"},
     {"gains.joint.damping_ratio: is 2.5, must be at most 2 (line 4)",
      "gains:\n  joint:\n    damping_ratio: 2.5\n"},
@@ -203,9 +203,9 @@ TEST(ConfigRefuses, WhatIsBeyondTheModel) {
     EXPECT_THAT(complaint(panda() + key + "}"), HasSubstr(", beyond ")) << key;
   }
   EXPECT_THAT(complaint(panda() + "limits: {walls: [{point: [0, 0, -50], normal: [0, 0, 1]}]}"),
-              HasSubstr("limits.walls: is 50 m, from the base, farther than the arm reaches"));
+              HasSubstr("limits.walls: is 50 m, from the base, beyond the arm's reach"));
   EXPECT_THAT(complaint(panda() + "watchdog: {setpoint_hold: 2, setpoint_damp: 0.5}"),
-              HasSubstr("before setpoint_hold, 2 s, which would never come"));
+              HasSubstr("before setpoint_hold, 2 s, so that hold would never act"));
   EXPECT_NO_THROW(load(panda() + "limits: {velocity: 2.18, torque: 12, position_lower: [-2.9, -1, "
                                  "-1, -2, -1, 0, -1]}"));
 }

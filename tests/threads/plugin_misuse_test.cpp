@@ -34,7 +34,7 @@ TEST(PluginRefuses, NullPointers) {
   EXPECT_EQ(plugin().read_snapshot(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
   EXPECT_EQ(plugin().read_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
   EXPECT_EQ(plugin().read_sampled_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
-  EXPECT_STREQ(plugin().last_error(), "a pointer that has to be there is NULL");
+  EXPECT_STREQ(plugin().last_error(), "a required pointer is NULL");
   EXPECT_EQ(plugin().joints(nullptr), 0u);
   EXPECT_EQ(plugin().joint_name(nullptr, 0), nullptr);
   EXPECT_EQ(plugin().period(nullptr), 0);
@@ -63,7 +63,7 @@ TEST(PluginRefuses, StructsOfAnotherSize) {
     const auto modes = std::make_unique<dashpot_modes>();
     modes->struct_size = wrong;
     EXPECT_EQ(plugin().read_modes(arm, modes.get()), DASHPOT_WRONG_STRUCT_SIZE);
-    EXPECT_STREQ(plugin().last_error(), "struct_size is not that of this version of plugin.h");
+    EXPECT_STREQ(plugin().last_error(), "struct_size does not match this version of plugin.h");
   }
 }
 

@@ -62,7 +62,7 @@ TEST(Plugin, KnowsItsVersionOnly) {
 
 TEST(Plugin, SaysWhyItCannotBeCreated) {
   EXPECT_EQ(plugin().create(nullptr), nullptr);
-  EXPECT_STREQ(plugin().last_error(), "a pointer that has to be there is NULL");
+  EXPECT_STREQ(plugin().last_error(), "a required pointer is NULL");
   EXPECT_EQ(plugin().create("no-such-file.yaml"), nullptr);
   EXPECT_STREQ(plugin().last_error(),
                "no-such-file.yaml: cannot be opened: No such file or directory");
