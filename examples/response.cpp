@@ -1,4 +1,4 @@
-// The three masses of spectrum.cpp, one pulled aside by 3 cm and let go: where they are at any
+// The three masses of spectrum.cpp, one pulled aside by 3 cm and let go: their positions at any
 // time, in closed form. There is no time step.
 #include <cstdio>
 #include <dashpot/analysis/response.hpp>

@@ -1,5 +1,5 @@
-// What becomes of a mode when the controller holds its force for a period: a mass of 1 kg on a
-// spring and a damper that a computer imitates every 10 ms.
+// The effect of a zero-order hold on a mode: a mass of 1 kg on a spring and a damper that a
+// computer imitates every 10 ms.
 #include <cstdio>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>

@@ -1,5 +1,5 @@
 // Three masses joined by springs and dampers, free to drift together: modes, each with a proved
-// bound of its error. The system is that of Fig. 2 of Kao and Saldarriaga (2021).
+// bound of its error. The system comes from Fig. 2 of Kao and Saldarriaga (2021).
 #include <cmath>
 #include <cstdio>
 #include <dashpot/analysis/spectrum.hpp>
@@ -11,7 +11,7 @@ int main() {
   system.mass << 8, 0, 0, 0, 2, 0, 0, 0, 5;                    // kg
   system.damping << 25, -15, -10, -15, 35, -20, -10, -20, 30;  // N s/m
   system.stiffness << 3600, -1200, -2400, -1200, 2700, -1500, -2400, -1500, 3900;  // N/m
-  const Spectrum<> spectrum = analyze(system);  // throws if the matrices are no proper system
+  const Spectrum<> spectrum = analyze(system);  // throws if the matrices are invalid
   for (const Mode<>& mode : spectrum.modes) {
     std::printf("%.2f rad/s, damping ratio %.4f, %s\n", mode.natural_frequency, mode.damping_ratio,
                 to_text(mode.kind));

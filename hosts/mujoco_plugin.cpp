@@ -47,12 +47,12 @@ class Arm {
     find_bodies(model, instance);
     find_release(model, attribute(model, instance, "release"));
     if (model->opt.integrator == mjINT_RK4) {
-      throw std::runtime_error("integrator: RK4 has states between steps, on which no tick can be");
+      throw std::runtime_error("integrator: RK4 has states between steps, without a tick");
     }
     const double steps = dashpot_period(controller_.get()) / model->opt.timestep;
     every_ = std::max(std::llround(steps), 1LL);
     if (std::abs(steps - static_cast<double>(every_)) > 1e-6 * steps) {
-      throw std::runtime_error("control.period: is no multiple of the model's timestep");
+      throw std::runtime_error("control.period: is not a multiple of the model's timestep");
     }
     snapshot_.struct_size = sizeof snapshot_;
     modes_.struct_size = sizeof modes_;
@@ -66,20 +66,20 @@ class Arm {
     publisher_->start();
   }
 
-  /// A status, its fault, the gain margin of the sampled loop and the number of modes; then the
-  /// frequencies of n modes, rad/s, and their damping ratios. Zero where there is nothing yet.
+  /// Number of values before the modes: status, fault, gain margin of the sampled loop and number
+  /// of modes. Frequencies, rad/s, and damping ratios of n modes follow; unknown values are zero.
   static constexpr int kSensed = 4;
 
-  /// The next tick begins at rest.
+  /// Makes the next tick begin at rest.
   void restart() noexcept {
     started_ = false;
     std::fill(torque_.begin(), torque_.end(), 0.0);
   }
 
-  /// Adds the torque to the passive forces; false, with `reason`, if it must not begin here.
+  /// Adds the torque to the passive forces. Returns false, with `reason`, if it must not start.
   bool act(const mjModel* model, mjData* data, std::string& reason) {
     const std::int64_t step = std::llround(data->time / model->opt.timestep);
-    // Somebody has set the time back, or looked at the model before placing the arm.
+    // The time was set back, or the arm was moved after a first step at the start.
     if (started_ && (step < step_ || (step == begin_ && moved(model, data)))) restart();
     if (!started_ || step >= step_ + every_) {
       for (std::size_t i = 0; i < joints_.size(); ++i) {
@@ -237,7 +237,7 @@ class Arm {
     }
   }
 
-  /// Once for each fault.
+  /// Prints once for each fault.
   void tell_of_brakes() noexcept {
     const bool needed = dashpot_needs_brakes(controller_.get()) != 0;
     if (needed && !told_) {
@@ -252,7 +252,7 @@ class Arm {
   int goal_ = -1;            ///< body whose pose is the set-point; -1: none
   int base_ = 0;             ///< body that is the base link; 0: the world
   int release_ = -1;         ///< index in userdata; -1: none
-  bool told_ = false;        ///< that a robot would need its brakes
+  bool told_ = false;        ///< the need of brakes was printed
   std::int64_t every_ = 1;   ///< steps of the model from tick to tick
   std::int64_t begin_ = 0;   ///< step of the first tick
   std::int64_t step_ = 0;    ///< of the last tick
@@ -291,8 +291,8 @@ void reset(const mjModel*, mjtNum*, void* arm, int) {
   if (arm != nullptr) static_cast<Arm*>(arm)->restart();
 }
 
-/// Returns why the arm must not be moved; "" if it may. Apart, so that nothing is left to destroy
-/// where MuJoCo's error jumps out.
+/// Returns why the arm must not be moved; "" if it may. A separate function, so that no destructor
+/// is skipped when MuJoCo's error jumps out.
 const char* act(const mjModel* model, mjData* data, int instance) {
   static thread_local std::string reason;
   reason.clear();
@@ -312,7 +312,7 @@ void compute(const mjModel* model, mjData* data, int instance, int capability) {
   }
 }
 
-/// MuJoCo asks before there is an mjData, and so before there is an arm.
+/// Returns the number of values. MuJoCo asks before there is an mjData, and so an arm.
 int sensed_by(const mjModel* model, int instance, int) {
   const std::string config = attribute(model, instance, "config");
   const std::unique_ptr<dashpot_controller, void (*)(dashpot_controller*)> controller(

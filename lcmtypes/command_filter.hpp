@@ -14,8 +14,8 @@ namespace dashpot::lcmtypes {
 
 /// Decides last about a command that passed all other checks and is contained in `command`. Returns
 /// true if the command is accepted, and false if the controller refuses its gains; `reason` then
-/// says why, in one line. Sets Command::pose_tool if the command sets the tip's pose, because what
-/// T is only the controller knows.
+/// says why, in one line. If the command sets the tip's pose, it sets Command::pose_tool, because
+/// only the controller knows the current T.
 using CommandTaker = std::function<bool(Command& command, std::string& reason)>;
 
 /// Decides which commands are accepted, and accumulates what they set. Judging needs no memory
@@ -37,7 +37,7 @@ class CommandFilter {
   explicit CommandFilter(const CommandLimits& limits, CommandTaker take = {});
 
   /// Judges `size` bytes that arrived at `utime` (us since 1970-01-01 UTC), which is `steady` us on
-  /// a clock that nobody sets. `command` changes only if the verdict is kAccepted.
+  /// a clock that is never set. `command` changes only if the verdict is kAccepted.
   CommandVerdict judge(const void* data, std::size_t size, std::int64_t utime,
                        std::int64_t steady) noexcept;
   /// Ends the command of a sender that has been silent for too long at the time `steady`, us.
@@ -72,7 +72,7 @@ class CommandFilter {
   CommandTaker take_;
   Command command_;
   CommandTally tally_;
-  std::string reason_;  ///< why the command that is being judged is refused, where more is known
+  std::string reason_;  ///< reason for refusing the judged command, if known
   std::string last_reason_;
   std::array<Last, 8> last_{};
   std::int64_t heard_at_ = 0;    ///< when a command of the commander was last accepted; steady, us

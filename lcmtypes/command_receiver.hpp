@@ -16,7 +16,7 @@ namespace dashpot::lcmtypes {
 /// for the real-time thread. Any other message changes only counters.
 class CommandReceiver {
  public:
-  /// Handles all messages of `bus` from now on; nobody else may handle them. `take` is called on
+  /// Handles all messages of `bus` from now on; no other code may handle them. `take` is called on
   /// the receiver's thread. Throws std::invalid_argument for bad limits, std::runtime_error if it
   /// cannot subscribe.
   CommandReceiver(std::shared_ptr<lcm::LCM> bus, const CommandLimits& limits,

@@ -35,7 +35,7 @@ struct CommandTally {
   CommandVerdict last_refusal = CommandVerdict::kAccepted;  ///< kAccepted: none was refused
   std::int64_t last_refusal_utime = 0;   ///< when it arrived, us since 1970-01-01 UTC
   std::int64_t last_refused_sender = 0;  ///< 0: it could not be read
-  std::int64_t commander = 0;            ///< the sender that commands the arm; 0: nobody does
+  std::int64_t commander = 0;            ///< the sender that commands the arm; 0: none
 
   std::int64_t count(CommandVerdict verdict) const noexcept {
     return verdicts[static_cast<std::size_t>(verdict)];

@@ -11,7 +11,7 @@ namespace dashpot::lcmtypes {
 /// drake-franka-driver. Their messages are lcmt_iiwa_status and so on, of the package drake.
 enum class DriverKind { kIiwa, kPanda };
 
-/// What a driver does not say in its messages.
+/// Properties of a driver that its messages do not contain.
 struct DriverProfile {
   const char* name;             ///< "iiwa", "panda"
   const char* status_channel;   ///< "IIWA_STATUS"
@@ -27,7 +27,7 @@ struct DriverStatus {
   std::int64_t utime = 0;            ///< us; -1: the iiwa's clock is not known yet
   controller::JointVector position;  ///< measured, rad
   controller::JointVector velocity;  ///< rad/s
-  /// iiwa: where the driver commands the joints to be, rad; taken as measured where it is empty.
+  /// iiwa: commanded joint positions, rad; the measured ones if it is empty.
   controller::JointVector commanded;
   controller::JointVector torque;    ///< measured, N m
   controller::JointVector external;  ///< external torque as the driver gives it, N m

@@ -38,7 +38,7 @@ class LogFile {
   const Event& event() const noexcept { return event_; }
   /// Returns where the sync word of the event read last begins, bytes.
   std::uint64_t offset() const noexcept { return offset_; }
-  /// Goes on reading at `offset`, which offset() gave. Does nothing for a pipe.
+  /// Continues reading at `offset`, which offset() returned. Does nothing for a pipe.
   void seek(std::uint64_t offset);
   const Damage& damage() const noexcept { return damage_; }
 

@@ -27,10 +27,10 @@ constexpr std::int32_t most_modes(std::int32_t n) {
   return n < controller::kMaxJoints / 2 ? 2 * n : controller::kMaxJoints;
 }
 
-/// Decodes bytes of unknown origin. The generated decoders allocate whatever an array's length
-/// field says before they look at how many bytes there are; so the fingerprint and these fields are
-/// read first. Returns false, with `message` unspecified, unless
-///   - the fingerprint is that of the message type,
+/// Decodes bytes of unknown origin. The generated decoders allocate the length that an array's
+/// length field states before they compare it with the number of bytes; so the fingerprint and
+/// these fields are read first. Returns false, with `message` unspecified, unless
+///   - the fingerprint belongs to the message type,
 ///   - the sizes are within 1 <= n <= 16, 0 <= num_modes <= most_modes(n),
 ///   - and the message fills `size` bytes exactly.
 /// Allocates less than kMaxMessageSize. Values are not judged: they may be NaN or out of range.

@@ -64,9 +64,8 @@ class LogReader {
   /// Returns what was found wrong with the log so far; "" if nothing. See
   /// describe(LogFile::Damage).
   std::string damage() const { return describe(file_.damage()); }
-  /// Returns why nobody finds anything in the log if no event handed on was on a channel of
-  /// Dashpot's: "has no messages of Dashpot; its channels are ..."; "" if one was, or none was
-  /// read.
+  /// Explains an empty result if no event handed on was on a channel of Dashpot's: "has no messages
+  /// of Dashpot; its channels are ..."; "" if one was, or none was read.
   std::string foreign() const;
 
  private:

@@ -8,11 +8,11 @@
  *   dashpot_publisher_destroy(p);
  *   dashpot_destroy(c);
  *
- * Link with libdashpot_publisher.so. It brings a thread of its own, which looks for a new tick
- * every half millisecond, and is the one that may call dashpot_read_snapshot, dashpot_read_modes
- * and dashpot_read_sampled_modes: nobody else may, while there is a publisher. Ticks that follow
- * each other faster are published in part. `utime` is when the tick was found. What only the host
- * knows (tick_time, overruns, verdicts of commands) is zero. */
+ * Link with libdashpot_publisher.so. It starts a thread, which looks for a new tick every half
+ * millisecond. While there is a publisher, only this thread may call dashpot_read_snapshot,
+ * dashpot_read_modes and dashpot_read_sampled_modes. Of ticks that follow each other faster, only
+ * some are published. `utime` is the time when the tick was found. Values that only the host knows
+ * (tick_time, overruns, verdicts of commands) are zero. */
 
 /* NOLINTBEGIN(readability-identifier-naming) */
 #include <dashpot/controller/plugin.h>

@@ -10,7 +10,7 @@
 
 namespace dashpot::lcmtypes {
 
-/// How well the loop keeps time, and the verdicts of the commands that were sent to it.
+/// Timing of the loop, and the verdicts of the commands that were sent to it.
 struct LoopHealth {
   std::int32_t tick_time = 0;          ///< computing time of the previous tick, ns
   std::int32_t longest_tick_time = 0;  ///< since the start, ns

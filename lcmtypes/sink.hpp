@@ -20,7 +20,7 @@ class Sink {
   /// the message got lost.
   virtual bool send(const std::string& channel, const std::vector<std::uint8_t>& bytes,
                     std::int64_t utime) = 0;
-  /// Brings to its place what waits in memory. Returns false if some of it got lost.
+  /// Writes out all that waits in memory. Returns false if some of it got lost.
   virtual bool finish() { return true; }
 };
 

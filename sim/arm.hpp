@@ -19,7 +19,7 @@ struct Wall {
   Contact contact{1e4, 50};                           ///< N/m, N s/m
 };
 
-/// Which side of an elastic gear positions and velocities are measured on.
+/// The side of an elastic gear on which positions and velocities are measured.
 enum class PositionSensor : std::uint8_t { kMotor, kLink };
 
 /// Forces on the arm in addition to gravity and torque. A force that is off or zero costs nothing.
@@ -111,7 +111,7 @@ class Arm : public System {
   ArmOptions options_;
   ArticulatedBody bodies_;
   std::vector<Gear> gears_;    // the elastic ones, in the order of their coordinates
-  std::vector<Force> forces_;  // those that this scene has
+  std::vector<Force> forces_;  // forces of this scene
   Schedule<Vector6> wrenches_;
   Vector6 wrench_ = Vector6::Zero();
   Schedule<Inertia> loads_;

@@ -52,7 +52,7 @@ struct Measurement {
   JointVector torque;     ///< that the drives exerted in the period before, N m
 };
 
-/// Where the energy went since the start, in J.
+/// The energy balance since the start, in J.
 struct EnergyAudit {
   StoredEnergy initial;
   StoredEnergy stored;       ///< now
@@ -67,8 +67,7 @@ struct EnergyAudit {
   double dissipated() const noexcept {
     return viscous_heat + friction_heat + contact_heat + gear_heat;
   }
-  /// Returns the energy that came from nowhere: zero except for the error of the integrator, which
-  /// is of the integrator's order.
+  /// Returns the error of the energy balance, which is of the integrator's order.
   double imbalance() const noexcept {
     return stored.sum() - initial.sum() - work_in() + dissipated();
   }
@@ -98,7 +97,7 @@ class Plant {
 
   const Measurement& measured() const noexcept { return measured_; }
 
-  // The truth, which a controller does not get to see:
+  // The true state, which a controller does not see:
   JointVector position() const { return y_.head(system_->dof()); }
   JointVector velocity() const { return y_.segment(system_->coordinates(), system_->dof()); }
   const StateVector& state() const noexcept { return y_; }
@@ -129,7 +128,7 @@ class Plant {
   System* system_;
   PlantOptions options_;
   Integrator integrator_;
-  std::vector<Stage> actuation_;  // those that these options have
+  std::vector<Stage> actuation_;  // stages of these options
   std::vector<Stage> sensing_;
   std::int64_t ticks_ = 0;
   StateVector y_;

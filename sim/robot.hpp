@@ -36,7 +36,7 @@ struct Joint {
   double gear_damping = 0;  ///< of an elastic gear, N m s/rad or N s/m
 
   bool elastic() const noexcept { return std::isfinite(gear_stiffness); }
-  /// Returns the inertia of the drive as far as it is rigid with the link, kg m^2 or kg.
+  /// Returns the part of the drive's inertia that is rigid with the link, kg m^2 or kg.
   double drive_inertia_on_link() const noexcept { return elastic() ? 0 : reflected_inertia; }
 };
 
@@ -73,7 +73,7 @@ class Robot {
   const std::vector<Joint>& joints() const noexcept { return joints_; }
   /// Returns the pose of the tip link in the frame of the last joint's body.
   const Pose& tip() const noexcept { return tip_; }
-  /// From now on this body is rigid at the tip, in the tip's axes, beside the payload.
+  /// Attaches this body to the tip, in the tip's axes, beside the payload.
   void carry(const Inertia& load) noexcept { joints_.back().inertia = last_ + tip_ * load; }
   /// Returns the gravity, m/s^2, in the axes of the base link.
   const Eigen::Vector3d& gravity() const noexcept { return gravity_; }

@@ -12,7 +12,7 @@ using Verdict = CommandVerdict;
 
 namespace {
 
-/// What is judged before it is taken, which takes long. Goals are not: the newest of a burst
+/// The parts that take long to judge, before they are accepted. Goals do not: the latest of a burst
 /// counts.
 constexpr std::int32_t kJudged = int{command_t::JOINT_GAINS} | int{command_t::TASK_GAINS} |
                                  int{command_t::NULL_GAINS} | int{command_t::TASK_RATIO} |
@@ -103,7 +103,7 @@ void CommandFilter::accept(const command_t& message, const Command& next, std::i
   command_ = next;
   last = {message.sender, message.utime, message.sequence, steady};
   heard_at_ = steady;
-  // Whoever begins to command finds the bucket full, whatever others took out of it.
+  // A new commander finds the bucket full, however much other senders took out of it.
   if (tally_.commander != message.sender) tokens_ = limits_.burst - 1;
   tally_.commander = (message.parts & command_t::GIVE_UP) != 0 ? 0 : message.sender;
 }

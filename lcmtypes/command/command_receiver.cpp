@@ -57,7 +57,7 @@ CommandReceiver::~CommandReceiver() {
 void CommandReceiver::run() {
   while (!stop_.load(std::memory_order_acquire)) {
     const int handled = bus_->handleTimeout(kLongestWait);
-    if (handled < 0) {  // a broken bus: nothing to do but not to spin
+    if (handled < 0) {  // a broken bus: wait, so that the loop does not spin
       std::this_thread::sleep_for(std::chrono::milliseconds(kLongestWait));
     }
     if (handled > 0 || filter_.tally().commander == 0) continue;

@@ -33,7 +33,7 @@ Verdict first_fault(std::initializer_list<Verdict> verdicts) {
   return Verdict::kAccepted;
 }
 
-/// Says which number is beyond its limits; `other` is a unit in which it would not be.
+/// Says which number is beyond its limits; in the unit `other` it would be within them.
 Verdict beyond(std::string& why, const std::string& name, double value, double least, double most,
                const char* other = "") {
   std::ostringstream text;
@@ -43,7 +43,7 @@ Verdict beyond(std::string& why, const std::string& name, double value, double l
   return Verdict::kOutOfLimits;
 }
 
-/// Every entry finite and within [least, most].
+/// Returns whether every entry is finite and within [least, most].
 template <class Derived>
 Verdict judge_entries(std::string& why, const char* name, const Eigen::MatrixBase<Derived>& values,
                       double least, double most) {
@@ -54,7 +54,7 @@ Verdict judge_entries(std::string& why, const char* name, const Eigen::MatrixBas
   return Verdict::kAccepted;
 }
 
-/// Also symmetric and positive semidefinite, both to rounding; made symmetric exactly.
+/// Also requires a symmetric positive semidefinite matrix, to rounding; makes it symmetric exactly.
 template <class Matrix>
 Verdict judge_gains(std::string& why, const char* name, Matrix& gains, double most) {
   const Verdict entries = judge_entries(why, name, gains, -most, most);
@@ -112,7 +112,7 @@ Verdict copy_joint_position(const command_t& message, const CommandLimits& limit
   return Verdict::kAccepted;
 }
 
-/// A position no further than `most` from the origin, and a quaternion.
+/// Requires a position no further than `most` from the origin, and a quaternion.
 Verdict copy_pose(std::string& why, const char* name, const double (&given)[3],
                   const double (&quaternion)[4], double most, controller::Pose& pose) {
   const Eigen::Map<const Eigen::Vector3d> position(given);
@@ -178,14 +178,14 @@ Verdict copy_ratio(std::string& why, const char* name, bool given, double value,
   return Verdict::kOutOfLimits;
 }
 
-/// That a body can have this inertia is for the controller to judge.
+/// The controller judges whether a body can have this inertia.
 Verdict copy_payload(const command_t& message, const CommandLimits& limits,
                      controller::Payload& payload, std::string& why) {
   using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   payload = {message.payload_mass, Eigen::Map<const Eigen::Vector3d>(message.payload_center),
              Eigen::Map<const RowMajor3>(&message.payload_inertia[0][0])};
   const Eigen::Matrix<double, 1, 1> mass(payload.mass);
-  // That of the whole mass at the greatest distance.
+  // Inertia of the whole mass at the greatest distance.
   const double most = payload.mass * limits.payload_distance * limits.payload_distance;
   return first_fault({judge_entries(why, "payload_mass", mass, 0, limits.payload),
                       judge_entries(why, "payload_center", payload.center, -limits.payload_distance,

@@ -14,7 +14,7 @@ using controller::JointVector;
 /// Reads the sizes of a message without decoding it.
 class Sizes {
  public:
-  /// `hash` is the fingerprint wanted.
+  /// `hash` is the expected fingerprint.
   Sizes(const void* data, std::size_t size, std::int64_t hash)
       : bytes_(static_cast<const unsigned char*>(data)), size_(size) {
     fits_ = data != nullptr && size >= 8 && read(8) == static_cast<std::uint64_t>(hash);
@@ -24,7 +24,7 @@ class Sizes {
     if (fits_) at_ += count;
     return *this;
   }
-  /// A number of entries, and so many entries for each of `arrays`.
+  /// Reads a number of entries, and this many entries for each of `arrays`.
   Sizes& arrays(int least, std::size_t arrays) {
     fits_ = fits_ && size_ - at_ >= 4;
     if (!fits_) return *this;
@@ -71,7 +71,7 @@ std::vector<double> list(const JointVector& values) {
   return {values.data(), values.data() + values.size()};
 }
 
-/// `values`, or as many zeros as `like` has entries.
+/// Returns `values`, or as many zeros as `like` has entries.
 std::vector<double> list(const JointVector& values, const JointVector& like) {
   return values.size() > 0 ? list(values) : std::vector<double>(list(like).size());
 }

@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::string_view kFile = "file://";
 
-/// LCM reads the logs of file:// URLs itself, and crashes where a length in them is false. Throws
-/// std::runtime_error with the reason unless it may read this one.
+/// Throws std::runtime_error with the reason if LCM must not read this log of a file:// URL,
+/// because LCM crashes on a wrong length.
 void check_log(const std::string& url) {
   const std::string options = url.substr(std::min(url.find('?'), url.size()));
   const bool writes = options.find("mode=w") != std::string::npos;
@@ -49,7 +49,7 @@ std::shared_ptr<lcm::LCM> open_bus(const std::string& url) {
   const auto begins = [&chosen](const char* provider) { return chosen.starts_with(provider); };
   if (!begins("udpm://") && !begins("memq://") && !begins("file://") && !begins("tcpq://")) {
     throw std::runtime_error("cannot open the LCM bus " + chosen +
-                             ": it begins with none of udpm://, memq://, file://, tcpq://");
+                             ": it does not begin with udpm://, memq://, file:// or tcpq://");
   }
   try {
     if (!path_of(chosen).empty()) check_log(chosen);

@@ -15,9 +15,9 @@ namespace {
 constexpr std::uint32_t kSync = 0xEDA1DA01;
 constexpr std::uint64_t kSyncSize = 4;
 constexpr std::size_t kHeaderSize = 24;        // number, time, and two lengths
-constexpr std::uint32_t kLongestChannel = 63;  // LCM sends none that is longer
+constexpr std::uint32_t kLongestChannel = 63;  // LCM sends no longer ones
 
-/// Nothing for a pipe or a device.
+/// Returns nothing for a pipe or a device.
 std::optional<std::uint64_t> size_of(const std::string& path) {
   std::error_code unknown;
   const std::uint64_t size = std::filesystem::file_size(path, unknown);
@@ -47,7 +47,7 @@ bool LogFile::read() {
       offset_ = start;
       return true;
     }
-    // Either the file ends too early, or the length is false: then there is another sync word.
+    // Either the file ends too early, or the length is wrong: then there is another sync word.
     unfinished = found == Found::kCut ? std::optional(start) : std::nullopt;
   }
   if (!unfinished && at_ > begin && at_ - begin < kSyncSize) unfinished = begin;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kFingerprintSize = 8;
 
-/// The fingerprint is that of Message, and `sizes` are read from the fields that follow it.
+/// Requires the fingerprint of Message, and reads `sizes` from the fields that follow it.
 template <class Message, std::size_t Count>
 bool read_sizes(const void* data, std::size_t size, std::array<std::int32_t, Count>& sizes) {
   if (data == nullptr || size > kMaxMessageSize) return false;

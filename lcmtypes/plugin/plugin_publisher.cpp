@@ -77,7 +77,7 @@ struct dashpot_publisher {
       }
       publisher_.offer(state_);
     }
-    // Modes may belong to an earlier tick; those of before the first one, to no tick.
+    // Modes may belong to an earlier tick, or, before the first tick, to none.
     if (dashpot_read_modes(controller_, &modes_) == DASHPOT_OK && modes_.tick != modes &&
         modes_.time >= 0) {
       modes_sample_.utime = utime - (snapshot_.time - modes_.time) / 1000;

@@ -6,7 +6,7 @@ namespace {
 
 using controller::JointVector;
 
-/// Copies fields from those of C structs, of n joints.
+/// Copies fields from C structs of n joints.
 struct FromC {
   std::uint32_t n;
 

@@ -20,7 +20,7 @@ void copy_to(const Vector& from, double (&to)[Size]) {
   std::copy_n(from.data(), Size, to);
 }
 
-// The numbers of modes_t are those of the analysis.
+// modes_t has the numbers of the analysis.
 using analysis::ModeKind;
 static_assert(static_cast<int>(ModeKind::kUnderdamped) == modes_t::UNDERDAMPED);
 static_assert(static_cast<int>(ModeKind::kCritical) == modes_t::CRITICAL);

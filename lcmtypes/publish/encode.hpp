@@ -10,10 +10,10 @@
 
 namespace dashpot::lcmtypes {
 
-/// Quaternion w, x, y, z of a rotation matrix; of the two, the one with w >= 0.
+/// Quaternion w, x, y, z of a rotation matrix, with w >= 0.
 void write_quaternion(const Eigen::Matrix3d& R, double (&quaternion)[4]);
 
-/// Copies a sample into a message. What a sample does not know is left as it is:
+/// Copies a sample into a message. Keeps fields that a sample does not have:
 /// state_t::states_dropped, and `sequence` of the others. Joint vectors that are not as long as the
 /// joint position are cut, or filled up with zeros.
 void fill(const StateSample& sample, state_t& message);

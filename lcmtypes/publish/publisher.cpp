@@ -13,8 +13,7 @@ void count(std::atomic<std::int64_t>& counter) {
   counter.fetch_add(1, std::memory_order_relaxed);
 }
 
-/// Whether two numbers differ by more than `tolerance`, relative; what is not a number is the same
-/// as itself.
+/// Returns true if two numbers differ by more than `tolerance`, relative; NaN equals NaN.
 bool differ(double a, double b, double tolerance) {
   if (std::isnan(a) || std::isnan(b)) return std::isnan(a) != std::isnan(b);
   return a != b && !(std::abs(a - b) <= tolerance * std::max(std::abs(a), std::abs(b)));
@@ -100,8 +99,7 @@ void Publisher::run() {
 }
 
 void Publisher::publish_pending() {
-  // No more than were waiting at the start, so that modes get their turn however slow the sinks
-  // are.
+  // No more than were waiting at the start, so that modes get their turn with slow sinks as well.
   for (std::size_t i = 0; i < options_.queue; ++i) {
     const StateSample* sample = states_.front();
     if (sample == nullptr) break;

@@ -7,8 +7,8 @@
 
 namespace dashpot::lcmtypes {
 
-/// A queue between one writing and one reading thread. Neither ever waits for the other: what finds
-/// the queue full is dropped and counted. All memory is taken at set-up.
+/// A queue between one writing and one reading thread. Neither ever waits for the other: items that
+/// find the queue full are dropped and counted. All memory is taken at set-up.
 template <class T>
 class SampleQueue {
  public:

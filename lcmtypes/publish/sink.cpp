@@ -42,7 +42,7 @@ class LogSink : public Sink {
     event.datalen = static_cast<std::int32_t>(bytes.size());
     event.data = const_cast<std::uint8_t*>(bytes.data());  // it is only read
     bool good = file_.writeEvent(&event) == 0;
-    // So that a killed run leaves its log; also when the time goes back, or is anything at all.
+    // So that a killed run leaves its log; also if the time goes back or is invalid.
     const auto since = static_cast<std::uint64_t>(utime) - static_cast<std::uint64_t>(flushed_at_);
     if (since >= static_cast<std::uint64_t>(kFlushPeriod)) {
       flushed_at_ = utime;

@@ -52,7 +52,7 @@ void validate(const ArmOptions& options) {
   }
 }
 
-/// How far a joint is beyond the nearer one of its limits, and which way the stop pushes.
+/// Distance of a joint beyond its nearer limit, and the direction in which the stop pushes.
 struct Stop {
   double depth;
   double direction;
@@ -128,7 +128,7 @@ void Arm::place(const JointVector& q, const JointVector& qd, StateVector& y) noe
   y.segment(n, N - n).setZero();
   y.segment(N + n, N - n).setZero();
   if (gears_.empty()) return;
-  // Deflections change the posture, and with it the weight, by parts of themselves only.
+  // Deflections change the posture, and with it the weight, by a small part of themselves.
   std::array<double, kMaxJoints> weight;
   double change = 1;
   for (int step = 0; step < kMostSteps && change > kFound; ++step) {

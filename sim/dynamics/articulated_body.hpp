@@ -39,7 +39,7 @@ class ArticulatedBody {
   Pose tip_pose() const noexcept;
   /// p_BT_B, m
   Eigen::Vector3d tip_position() const noexcept;
-  /// Linear (of the tip's origin, m/s) and angular (rad/s), in the base's axes.
+  /// tau = J' w: the joint torques of the wrench at the tip, N m.
   Vector6 tip_twist() const noexcept;
   /// tau = J' w: what the wrench at the tip amounts to in the joints, N m.
   void transposed_jacobian(const Vector6& wrench, double* tau) const noexcept;
@@ -62,7 +62,7 @@ class ArticulatedBody {
     Vector6 bias;      // p: force that keeps the acceleration zero, then articulated
     Vector6 reaction;  // U = I S
     double gain;       // 1 / (S' I S + drive_inertia_on_link)
-    double excess;     // u: generalized force that is left to accelerate the joint
+    double excess;     // u: remaining generalized force, which accelerates the joint
   };
 
   const Robot* robot_;

@@ -4,7 +4,7 @@
 namespace dashpot::sim {
 
 /// A spring with a damper in parallel that only pushes: force = max(0, k d + c d') while the depth
-/// d is positive. What leaves it faster than the spring can follow loses the spring's energy.
+/// d is positive. A body that leaves it faster than the spring follows loses the spring's energy.
 struct Contact {
   double stiffness = 0;  ///< k >= 0, N/m or N m/rad
   double damping = 0;    ///< c >= 0, N s/m or N m s/rad

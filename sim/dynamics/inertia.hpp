@@ -15,7 +15,7 @@ inline Pose operator*(const Pose& a, const Pose& b) {
   return {a.position + a.rotation * b.position, a.rotation * b.rotation};
 }
 
-/// Returns the inertia seen from the frame in which the body's frame has this pose.
+/// Returns the inertia in the frame in which the body's frame has this pose.
 inline Inertia operator*(const Pose& pose, const Inertia& body) {
   return {body.mass, pose.position + pose.rotation * body.center,
           pose.rotation * body.about_center * pose.rotation.transpose()};

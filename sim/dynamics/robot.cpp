@@ -67,7 +67,7 @@ void require_physical(const Inertia& body, const std::string& where, bool any_in
   }
 }
 
-/// The parser says what is wrong through a logger; this keeps it.
+/// Keeps the parser's messages, which it reports through a logger.
 class ParserMessages : public console_bridge::OutputHandler {
  public:
   ParserMessages() { console_bridge::useOutputHandler(this); }
@@ -190,7 +190,7 @@ class Reader {
   urdf::ModelInterfaceSharedPtr model_;
 };
 
-/// All of a moving joint but its pose and inertia.
+/// Reads a moving joint, without its pose and inertia.
 Joint Reader::joint(const urdf::Joint& read) const {
   const bool continuous = read.type == urdf::Joint::CONTINUOUS;
   const bool prismatic = read.type == urdf::Joint::PRISMATIC;
@@ -235,7 +235,7 @@ Matrix3d frame_on(const Vector3d& axis) {
   return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
 }
 
-/// The moving joints along the path; returns the pose of its last link in the last one's body.
+/// Adds the moving joints along the path; returns its last link's pose in the last joint's body.
 Pose read_chain(const Reader& reader, const std::vector<urdf::JointConstSharedPtr>& path,
                 std::vector<Joint>& joints) {
   // The pose of the link reached so far in the last moving joint's body, or in the base.
@@ -276,7 +276,7 @@ void override_with(const JointVector& values, double Joint::*member, const char*
   }
 }
 
-/// Gears, of which an elastic one needs a drive with an inertia.
+/// Sets gears; an elastic one needs a drive with an inertia.
 void set_gears(const RobotParameters& parameters, std::vector<Joint>& joints) {
   const JointVector& stiffness = parameters.gear_stiffness;
   override_with(parameters.gear_damping, &Joint::gear_damping, "gear_damping", "N m s/rad", joints);
@@ -299,7 +299,7 @@ void set_gears(const RobotParameters& parameters, std::vector<Joint>& joints) {
   }
 }
 
-/// Every joint must move something. Masses that lie on its axis in some position are not found
+/// Every joint must move something. Masses that lie on its axis in some position are not detected
 /// here; the plant then reports Status::kStateNotFinite.
 void require_inertia(const std::vector<Joint>& joints, const std::string& name) {
   double mass = 0, moment = 0;

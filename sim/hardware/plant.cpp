@@ -21,7 +21,7 @@ void require_finite(const JointVector& values, int n, const char* key) {
   if (!values.allFinite()) throw InvalidScene(key, "is not finite");
 }
 
-/// Whether the option is on, after a check of its values.
+/// Returns true if the option is on, after a check of its values.
 bool is_on(const JointVector& values, int n, const char* key, const char* unit) {
   if (values.size() == 0) return false;
   require_size(values, n, key);
@@ -139,7 +139,7 @@ void Plant::carry(const JointVector& q, const JointVector& qd) noexcept {
   measure();
 }
 
-/// Through one period, cut where external forces jump.
+/// Moves through one period, divided where external forces jump.
 Status Plant::move(StateVector& y) noexcept {
   const double end = static_cast<double>(ticks_ + 1) * options_.period;
   for (double t = time(); t < end;) {
@@ -202,7 +202,7 @@ void Plant::quantise(Plant& plant) noexcept {
 }
 
 bool Plant::acts(const SensorFault& fault) const noexcept {
-  // By whole ticks: a sum of periods may lie a rounding error before the time that was meant.
+  // By whole ticks: a sum of periods may be a rounding error before the intended time.
   const double now = time() + 1e-6 * options_.period;
   return fault.begin <= now && now < fault.end;
 }

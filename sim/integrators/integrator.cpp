@@ -10,7 +10,7 @@ namespace {
 constexpr double kLocated = 1e-10;    // contacts begin and end within this, s
 constexpr double kLeastStep = 1e-12;  // s
 
-/// Their equations may have no solution where a force jumps, so contacts keep still in a step.
+/// Their equations may have no solution where a force jumps, so contacts keep their modes.
 bool is_implicit(Method method) noexcept {
   return method == Method::kImplicitMidpoint || method == Method::kRosenbrock;
 }
@@ -74,7 +74,7 @@ Status Integrator::advance(System& system, double duration, StateVector& y) noex
 }
 
 Status Integrator::advance_fixed(System& system, double duration, StateVector& y) noexcept {
-  // A remainder of rounding is no reason for another step.
+  // A remainder from rounding does not require another step.
   const double steps = std::max(1.0, std::ceil(duration / options_.max_step - 1e-9));
   const double h = duration / steps;
   const bool freezes = is_implicit(options_.method) && system.has_contacts();
@@ -110,7 +110,7 @@ Status Integrator::advance_adaptive(System& system, double duration, StateVector
       if (next_step_ < kLeastStep) status = Status::kTooManySteps;
       continue;
     }
-    // The end of a segment cuts a step without saying anything about the next one.
+    // The end of a segment shortens a step, which tells nothing about the next step.
     const double grown = h * std::clamp(0.9 * std::pow(error, exponent_), 0.5, 5.0);
     next_step_ = std::min(options_.max_step, last ? std::max(next_step_, grown) : grown);
     const bool lands = contacts && system.contact_modes(next_) != modes;
@@ -157,8 +157,8 @@ double Integrator::weighted_size(const StateVector& x) const noexcept {
       .maxCoeff();
 }
 
-/// E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.4: a step of
-/// which the first and second derivative say that its error is small.
+/// E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.4: a step
+/// whose error is small according to the first and second derivative.
 double Integrator::first_step(System& system) noexcept {
   begin_step(system);
   const double size = weighted_size(y_), rate = weighted_size(rates_[0]);
