@@ -1,14 +1,14 @@
 // Full task-space damping for one target ratio at a new configuration, six task directions:
-// design/full/n, warm-started along a path of a thousand configurations as the control loop sees
-// them; design/cold/n, each from nothing. Beside them what a plain double diagonalisation takes
+// design/full/n, warm-started along a path of a thousand configurations as in the control loop;
+// design/cold/n, each without a warm start. For comparison a plain double diagonalisation
 // (design/eigen/n): Lambda = (J M^-1 J')^-1, then Eigen's GeneralizedSelfAdjointEigenSolver, all in
-// fixed-size matrices. design/friction/n takes joint friction off besides, design/joint/n is that
-// of springs in the joints. design/region/n designs one matrix for 32 configurations of n joints on
-// one thread, design/map/n only judges one there; items_per_second counts configurations.
-// design/loop/n/d is one for a sampled loop with friction, a low-pass and d ticks of delay, which
-// bears less than is wanted, and design/hopeless/n/d one where no damping has the margin wanted.
-// contact/limit/n/d is the stiffness that such a loop bears along one direction, and
-// contact/proved/n/d the same with its bracket.
+// fixed-size matrices. design/friction/n also subtracts joint friction, and design/joint/n has
+// springs in the joints. design/region/n designs one matrix for 32 configurations of n joints on
+// one thread, and design/map/n only evaluates one there; items_per_second counts configurations.
+// design/loop/n/d designs for a sampled loop with friction, a low-pass and d ticks of delay, whose
+// achievable damping is below the target; in design/hopeless/n/d no damping keeps the margin.
+// contact/limit/n/d computes the stable contact stiffness of such a loop along one direction, and
+// contact/proved/n/d also its bracket.
 #include <dashpot/analysis/contact_limit.hpp>
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_region.hpp>
@@ -95,7 +95,7 @@ void joint(benchmark::State& state) {
   }
 }
 
-/// Every so many configurations of the path.
+/// Returns evenly spaced configurations of the path.
 std::vector<dashpot::analysis::TaskImpedance> configurations(Eigen::Index n) {
   constexpr std::size_t kCount = 32;
   const Path path(n);

@@ -1,5 +1,5 @@
-// How long a driver waits for the command to its status: from `dashpot drive`, and beside it in the
-// same run from a peer that copies the position into a command, and does nothing else.
+// How long a driver waits for the command to its status: from `dashpot drive`, and in the same run
+// from a peer that only copies the position into a command.
 //     drive_latency PROGRAM CONFIG [SECONDS]
 
 #include <dashpot/lcmtypes/bus.hpp>
@@ -41,7 +41,7 @@ void publish(lcm::LCM& bus, const char* channel, const Bytes& bytes) {
   bus.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size()));
 }
 
-/// As `dashpot drive` does, where that is allowed.
+/// As in `dashpot drive`, if that is allowed.
 void schedule_ahead() {
   sched_param parameter{};
   parameter.sched_priority = 80;
@@ -145,7 +145,7 @@ void hear(lcm::LCM& bus, Clock::time_point end) {
   }
 }
 
-/// An arm that is led to and fro, so that its modes change in every period.
+/// An arm that is moved to and fro, so that its modes change in every period.
 DriverStatus status_at(int k) {
   constexpr double kPeriod = 1e-3, kAmplitude = 0.02, kRate = 6;  // s, rad, rad/s
   DriverStatus status;

@@ -30,7 +30,7 @@ using dashpot::testing::KdlDynamics;
 using dashpot::testing::RandomRobot;
 
 constexpr unsigned kSeed = 20210001;
-constexpr std::size_t kStates = 64;  // taken in turn, so that no branch is learnt by heart
+constexpr std::size_t kStates = 64;  // taken in turn, so that no branch is learnt
 
 std::string chain_text(int n) {
   return RandomRobot(kSeed + static_cast<unsigned>(n)).chain(n, 0);

@@ -1,4 +1,4 @@
-"""What callgrind saw of single control ticks, by the part of the library that ran:
+"""Counts of callgrind in single control ticks, by the part of the library that ran:
     footprint.py FILE...
 reads callgrind's dumps of tick_bench's `footprint`, which began with empty and practically
 unlimited caches, so that each line of memory was missed once; prints Google Benchmark's rows with
@@ -35,7 +35,7 @@ def costs(text):
             if name:
                 names[number] = name
         elif line.startswith("calls="):
-            skip = True  # the next line is what the callee and all below it cost
+            skip = True  # the next line is the cost of the callee and all below it
         elif re.match(r"[+\-*\d]", line):
             if not skip and function is not None:
                 yield function, dict(zip(events, map(int, line.split()[1:])))

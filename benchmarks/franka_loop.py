@@ -2,8 +2,8 @@
 
 Two loops one after the other with the robot at ADDRESS: the bare one of the maker's examples, which
 writes zero torques, and Dashpot's with controller/examples/fr3_franka.yaml. Times are from the
-arrival of a state in the kernel until its torque was written. A simulated robot only: the bare loop
-holds nothing.
+arrival of a state in the kernel until its torque was written. For a simulated robot only, because the bare
+loop does not hold the arm.
 """
 
 import sys

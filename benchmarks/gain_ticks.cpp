@@ -1,12 +1,12 @@
-// Control ticks with the worst of all gains that are accepted: what instruction_count.sh counts.
-//     gain_ticks JOINTS followed TICKS     ticks of a swinging arm whose modes are followed
+// Control ticks with the most expensive gains that are accepted, which instruction_count.sh counts.
+//     gain_ticks JOINTS followed TICKS     ticks of a swinging arm whose modes are tracked
 //     gain_ticks JOINTS search TRIALS      looks for gains that make an analysis long, and writes
 //                                          these and others to standard output, one line each
-//     gain_ticks JOINTS replay             reads such lines, does some ticks with each, and says of
-//                                          each tick what its analysis did
+//     gain_ticks JOINTS replay             reads such lines, does some ticks with each, and reports
+//                                          the analysis of each tick
 // JOINTS is 7, a Panda, or another number, a random chain. The search starts from random gains of
-// every kind and changes the best it has, by the work that the analysis counts, with all of a
-// period to spend and with the share that is the default. Each line is run twice, without and with
+// every kind and changes the best so far, by the work that the analysis counts, with all of a
+// period to spend and with the default share. Each line is run twice, without and with
 // the terms that make stiffness and damping nonsymmetric.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -188,7 +188,7 @@ class Bench {
           settings_.initial.joint_position[i] + 0.4 * std::sin(phase + static_cast<double>(i));
     }
     tick();
-    usleep(2000);  // what does not fit into a tick is done before the next one
+    usleep(2000);  // the work beyond a tick is done before the next one
   }
   const Vibration& modes() const { return controller_.vibration(); }
 
@@ -200,7 +200,7 @@ class Bench {
     worst_ = worse(worst_, controller_.update(state_, setpoint_, torque_));
     end_of_tick();
   }
-  /// The thread finishes what it has, so that the next tick is tried.
+  /// The thread finishes its task, so that the next tick is tried.
   template <class Report>
   void wait_for_thread(const Report& report) {
     for (int wait = 1; controller_.vibration().status == kUnfinished && wait < 1'000'000;

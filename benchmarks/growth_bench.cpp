@@ -1,7 +1,7 @@
-// How a damping design for a region grows with the number of configurations
-// (growth/configurations/N, one thread; growth/region/N, all threads, once) and shrinks with that
-// of threads (growth/threads/T, 32 configurations). Growth with joints and modes is that of the
-// other programs.
+// Growth of a damping design for a region with the number of configurations
+// (growth/configurations/N, one thread; growth/region/N, all threads, once) and its speed-up with
+// the number of threads (growth/threads/T, 32 configurations). The other programs show the growth
+// with joints and modes.
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 

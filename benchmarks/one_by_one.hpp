@@ -46,8 +46,8 @@ class Evicted {
   std::uint64_t sum_ = 0;
 };
 
-/// Clock times of the calls, each after `prepare`, as percentiles in us. What else the machine does
-/// is in them. The benchmark needs UseManualTime and Iterations.
+/// Clock times of the calls, each after `prepare`, as percentiles in us. They include other work of
+/// the machine. The benchmark needs UseManualTime and Iterations.
 template <class Prepare, class Call>
 void time_one_by_one(benchmark::State& bench, Prepare prepare, const Call& call) {
   using Clock = std::chrono::steady_clock;

@@ -23,7 +23,7 @@ inline Eigen::VectorXd qz_work_space(Eigen::Index n) {
   return Eigen::VectorXd(static_cast<Eigen::Index>(size));
 }
 
-/// [C -I; K 0] x = -l [M 0; 0 I] x in these coordinates: rows of M times Q_M' (M P = Q_M R), those
+/// [C -I; K 0] x = -l [M 0; 0 I] x in these coordinates: rows of M times Q_M' (M P = Q_M R), rows
 /// of K times Q_K', of which only the first `rank` are not zero.
 class Quadeig {
  public:

@@ -1,10 +1,9 @@
-// Control ticks of a Panda at random states, one as little like the last as can be, with set-points
-// that move all the time: what instruction_count.sh counts.
+// Control ticks of a Panda at random states, each as different from the last as possible, with
+// moving set-points, which instruction_count.sh counts.
 //     random_ticks joint|cartesian|blend|modes|lost|still TICKS
 // Every 16th state is next to a singularity; `blend` changes gains, frame and mode at every tick.
 // The others find the modes in every tick: `modes` of a swinging arm, `lost` at random states,
-// where nothing can be followed and each tick ends in the direct solver, `still` of one that
-// trembles.
+// where no mode can be tracked and each tick ends in the direct solver, `still` of a trembling arm.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/tests/support/places.hpp>

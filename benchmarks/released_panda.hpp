@@ -1,5 +1,5 @@
 #pragma once
-// A Panda under Cartesian impedance control that is let go: one right-hand side for everyone's
+// A Panda under Cartesian impedance control that is let go: one right-hand side for all
 // integrators.
 #include <dashpot/sim/dynamics/articulated_body.hpp>
 #include <dashpot/sim/simulated_system.hpp>

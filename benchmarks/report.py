@@ -1,4 +1,4 @@
-"""Makes of the benchmarks' parts what ./run bench shows:
+"""Makes the results of ./run bench from the benchmarks' parts:
     report.py DIR [--publish]
 reads DIR/parts/*.json (Google Benchmark's, repeated), writes DIR/results.json (a row for each name,
 with medians), DIR/headline.md, and DIR/*.dat for plots.gp, and prints the table and the exponents.
@@ -54,13 +54,13 @@ def merge(parts):
 
 
 def microseconds(row):
-    """CPU time, but real time of what runs on several threads."""
+    """CPU time, or real time for several threads."""
     kind = "real_time" if row["name"].endswith("/real_time") else "cpu_time"
     return row[kind] * NANOSECONDS[row["time_unit"]] / 1e3
 
 
 def is_too_short(row):
-    """Interrupted while it was found how often to repeat it, so that it ran a few times, cold."""
+    """True if the search for its number of repetitions was interrupted, so that it ran a few times, cold."""
     nanoseconds = row["cpu_time"] * NANOSECONDS[row["time_unit"]]
     return nanoseconds < 1e5 and nanoseconds * row["iterations"] < 2e5
 
@@ -121,14 +121,14 @@ def headline(results):
         comparison(results, "the same, values only", "spectrum/values_only/6", [],
                    "little: only a host that reads no shapes saves this"),
         comparison(results, "the same, nothing has changed", "spectrum/reused/6", [],
-                   "an arm at rest has its modes for nothing"),
+                   "an arm at rest has its modes at no cost"),
         comparison(results, "7 modes, tracked, symmetric", "spectrum/tracked_full/7",
                    [("spectrum/eigen_full/7", "Eigen")],
                    "modes of every tick of a seven-joint arm for {ours} of a period; without proof {rival}"),
         comparison(results, "7 modes, tracked, K and C not symmetric",
                    "spectrum/tracked_nonsymmetric/7", [],
                    "the same under a load or with jacobian_rate: {ours} of a period"),
-        comparison(results, "14 modes of an arm whose gears bend, tracked", "spectrum/tracked/14",
+        comparison(results, "14 modes of an arm with elastic joints, tracked", "spectrum/tracked/14",
                    [("spectrum/path_eigen/14", "Eigen")],
                    "modes of motors and links in every tick for {ours} of a period; without proof {rival}"),
         comparison(results, "spectrum of 6 modes, from nothing, with bounds", "spectrum/direct/6",
@@ -142,14 +142,14 @@ def headline(results):
                    "the torque is there after {ours} of a period"),
         comparison(results, "tick: with modes and snapshot", "tick/full/7", [],
                    "modes need no thread of their own: {ours} of a period"),
-        comparison(results, "tick: with modes of an arm whose gears bend", "tick/elastic/7", [],
+        comparison(results, "tick: with modes of an arm with elastic joints", "tick/elastic/7", [],
                    "twice as many modes, in the tick as well: {ours} of a period"),
         comparison(results, "tick: with ratio damping", "tick/design/7", [],
                    "the damping follows the arm for {ours} of a period"),
         comparison(results, "tick: with modes under a load", "tick/loaded/7", [],
                    "modes of an arm that holds a load, in the tick as well: {ours} of a period"),
         comparison(results, "tick: with modes, once in a millisecond", "tick/paced/7", [],
-                   "what a loop at 1 kHz really takes: {ours} of a period"),
+                   "the real time of a loop at 1 kHz: {ours} of a period"),
         comparison(results, "tick: with modes, caches cold", "tick/evicted/7", [],
                    "the same beside a camera or a planner: {ours} of a period"),
         comparison(results, "spectrum of 6 modes, tracked, once in a millisecond",
@@ -269,7 +269,7 @@ def exponents(results):
 
 
 def front(points):
-    """Those (time, error) that no other beats in both."""
+    """The (time, error) that no other beats in both."""
     best = []
     for time, error in sorted(points):
         if not best or error < best[-1][1]:
@@ -325,7 +325,7 @@ def figures(results, context):
 
 
 def put_between(path, name, text):
-    """Replaces what stands between the marks of this name."""
+    """Replaces the text between the marks of this name."""
     begin, end = f"<!-- {name} of ./run bench -->\n", f"<!-- end of {name} -->\n"
     before, rest = path.read_text().split(begin)
     path.write_text(before + begin + text + end + rest.split(end)[1])
@@ -334,7 +334,7 @@ def put_between(path, name, text):
 def main():
     directory = pathlib.Path(sys.argv[1])
     names = sorted(glob.glob(str(directory / "parts" / "*.json")))
-    # A program of which a filter leaves nothing writes nothing.
+    # A program without benchmarks after the filter writes nothing.
     parts = [json.load(open(name)) for name in names if pathlib.Path(name).stat().st_size]
     merged = merge(parts)
     (directory / "results.json").write_text(json.dumps(merged, indent=1))
@@ -351,7 +351,7 @@ def main():
     print("\nSpectra of 6 modes, time against proved bound as iterations are added (relative change since")
     print("the last spectrum), and solved directly with residuals of growing precision:")
     print("\n".join(passes_table(results)))
-    print(f"\nRivals: {rivals.versions(parts)}. Those of 6 modes beside ours, solved directly:")
+    print(f"\nRivals: {rivals.versions(parts)}. Spectra of 6 modes beside ours, solved directly:")
     print("\n".join(rivals.spectra(results.rows, microseconds)))
     print("\nDynamics of 7 joints, all terms unless named, beside all of ours:")
     print("\n".join(rivals.dynamics(results.rows, microseconds)))
@@ -360,7 +360,7 @@ def main():
     print("\nGrowth with the number of joints, modes, configurations, threads:")
     print("\n".join(exponents(results)))
     if results.too_short:
-        print("\nLeft out of all this, for they ran too short (a busy machine?); run again:")
+        print("\nLeft out, because they ran too short (a busy machine?); run again:")
         print("  " + ", ".join(results.too_short))
     if "--publish" in sys.argv:
         short = figures(results, merged["context"])

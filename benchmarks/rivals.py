@@ -1,4 +1,4 @@
-"""What report.py tells of rivals beyond the fastest one: their versions, and tables of ratios to ours."""
+"""Results of report.py for all rivals: their versions, and tables of ratios to ours."""
 
 import re
 

@@ -1,5 +1,4 @@
-// A millisecond of a simulated arm under held torque: sim/METHOD/ARM, with how many times faster
-// than real time that is.
+// A millisecond of a simulated arm under held torque: sim/METHOD/ARM, with the factor of real time.
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/support/places.hpp>

@@ -1,4 +1,4 @@
-// Periods of a simulated Panda with one thing more than gravity and rigid bodies: what
+// Periods of a simulated Panda with one effect beyond gravity and rigid bodies, which
 // instruction_count.sh counts.
 //     sim_ticks KIND TICKS
 #include <dashpot/sim/arm.hpp>
@@ -21,7 +21,7 @@ struct Kind {
   PlantOptions plant;
 };
 
-/// What each kind adds; the numbers do not matter, only that it is there.
+/// The effect of each kind; its values do not matter.
 const std::map<std::string, std::function<void(Kind&)>>& kinds() {
   static const std::map<std::string, std::function<void(Kind&)>> all = {
       {"bare", [](Kind&) {}},

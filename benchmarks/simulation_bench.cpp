@@ -1,9 +1,9 @@
 // Run time against error: a second of a Panda that an impedance controller holds and lets go, soft,
 // ordinary and stiff, with every integrator of sim/, with Boost.Odeint's steppers on the same
-// right-hand side (but rosenbrock4: that of Boost 1.74 is no C++20), and with MuJoCo on the same
-// robot. Names: simulation/GAINS/WHOSE/METHOD/STEPS or /TOLERANCE; `error` is the largest of the
-// joints' after the second, rad, against a solution on which two methods of different families
-// agree to `reference`.
+// right-hand side (except rosenbrock4, because Boost 1.74's does not compile as C++20), and with
+// MuJoCo on the same robot. Names: simulation/GAINS/WHOSE/METHOD/STEPS or /TOLERANCE; `error` is
+// the largest of the joints' after the second, rad, against a solution on which two methods of
+// different families agree to `reference`.
 #include <dashpot/benchmarks/released_panda.hpp>
 #include <dashpot/sim/integrator.hpp>
 #ifdef DASHPOT_HAVE_MUJOCO
@@ -31,7 +31,7 @@ using State = ReleasedPanda::State;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kEnd = 1;         // s
-constexpr double kHopeless = 0.1;  // rad; nobody wants such a result
+constexpr double kHopeless = 0.1;  // rad; such a result is useless
 constexpr std::array<int, 22> kSteps = {4,  5,  6,  8,  10,  12,  14,  16,  20,   25,   32,
                                         40, 50, 64, 80, 100, 160, 256, 512, 1000, 2000, 4000};
 constexpr std::array<double, 16> kTolerances = {1,    3e-1, 1e-1, 3e-2, 1e-2, 3e-3, 1e-3,  3e-4,
@@ -112,7 +112,7 @@ Solve bulirsch_stoer(double tolerance) {
   };
 }
 
-/// With accelerations that depend on velocities, which it takes from the step before.
+/// Accelerations that depend on velocities use the velocities of the step before.
 Solve odeint_verlet(int steps) {
   using Half = std::array<double, ReleasedPanda::kJoints>;
   using Stepper =
@@ -178,7 +178,7 @@ void measure(benchmark::State& state, double gain, double error, const Solve& so
       static_cast<double>(panda.evaluations()) / static_cast<double>(runs);
 }
 
-/// Registers what comes near the solution at all.
+/// Registers runs that come near the solution.
 void add(const std::string& gains, double gain, const std::string& name, const Solve& solve) {
   ReleasedPanda panda(gain);
   const double error = largest_difference(solve(panda), reference(gain).end);
@@ -244,7 +244,7 @@ void add_adaptive(const std::string& gains, double gain, double tolerance) {
   rival("bulirsch_stoer", bulirsch_stoer(tolerance));
 }
 
-#ifdef DASHPOT_MUJOCO_NAME  // another MuJoCo than that of simulation_bench, which has all the rest
+#ifdef DASHPOT_MUJOCO_NAME  // a second version of MuJoCo, without the other methods
 constexpr bool kOnlyMujoco = true;
 #else
 constexpr bool kOnlyMujoco = false;

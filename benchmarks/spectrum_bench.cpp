@@ -1,8 +1,8 @@
 // Cold solve of a damped second-order system with m modes: from {M, C, K} to modes with both
-// eigenvector sides, backward errors and proved bounds (direct), beside what others need for less:
-// Eigen's EigenSolver with right vectors and LAPACK's dgeev with both sides, each on the 2m x 2m
-// state matrix, which is formed outside the clock. The worst backward error is printed beside each
-// time.
+// eigenvector sides, backward errors and proved bounds (direct), compared with solvers that return
+// less: Eigen's EigenSolver with right vectors and LAPACK's dgeev with both sides, each on the 2m x
+// 2m state matrix, which is formed outside the clock. The worst backward error is printed beside
+// each time.
 #include <dashpot/analysis/spectrum.hpp>
 
 #include <benchmark/benchmark.h>

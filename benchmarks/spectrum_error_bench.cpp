@@ -1,6 +1,6 @@
 // Run time against error of spectra: spectrum_error/DAMPING_SCALING/METHOD/m for m modes. `error`
-// is the largest relative one of an eigenvalue against those that FLINT/Arb proves, `bound` what we
-// prove of it.
+// is the largest relative error of an eigenvalue against the proved ones of FLINT/Arb, `bound` our
+// proved bound of it.
 //   ours_direct, ours_tracked (from a system that differs by 1e-4), ours_values (the same without
 //     shapes), ours_reused (the same system again): {M, C, K} to modes, with proved bounds
 //   ours_working, ours_extended: directly, with residuals in working precision or in twice that
@@ -92,7 +92,7 @@ struct Problem {
   std::vector<LongComplex> truth;
 };
 
-/// Counts the largest relative error, each value matched with the nearest true one that is left.
+/// Counts the largest relative error, each value matched with the nearest remaining true one.
 void report(benchmark::State& state, const Problem& problem, const Values& found) {
   std::vector<LongComplex> left = problem.truth;
   double largest = found.size() == left.size() ? 0 : 1;

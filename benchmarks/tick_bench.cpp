@@ -1,15 +1,14 @@
 // A whole control tick: state check, model, set-point path, law and safety, with all feed-forward
-// and moving set-points. `tick/cartesian` has the null space where the arm is redundant,
-// `tick/joint` is joint impedance. 6 joints are the UR5, 7 the Panda, 14 a random chain. The arm
-// swings, and its state is a new one at every tick. `tick/full` has the spectrum of each as well,
-// with shapes, and the snapshot; `tick/design` besides holds a damping ratio;
-// `tick/elastic` is `tick/full` of an arm whose gears bend, with 14 modes;
-// `tick/loaded` has `control.load` and `jacobian_rate` on, under a wrench; `_steady`
-// has the integral of the springs, and friction compensated at the measured velocity;
-// `_values_only` without shapes; `_background` hands it to a thread;
+// and moving set-points. `tick/cartesian` has the null space if the arm is redundant, `tick/joint`
+// is joint impedance. 6 joints are the UR5, 7 the Panda, 14 a random chain. The arm swings, and its
+// state is a new one at every tick. `tick/full` has the spectrum of each as well, with shapes, and
+// the snapshot; `tick/design` also keeps a damping ratio; `tick/elastic` is `tick/full` of an arm
+// with elastic joints and 14 modes; `tick/loaded` has `control.load` and `jacobian_rate` on, under
+// a wrench; `_steady` has the integral of the springs, and friction compensated at the measured
+// velocity; `_values_only` has no shapes; `_background` hands the spectrum to a thread;
 // `_percentiles` times a million ticks one by one. `tick/paced` and `tick/evicted` are `tick/full`
 // at the pace of 1 kHz, and after 64 MB of other data have passed through the caches. `footprint`
-// is there under callgrind alone: a tick of each of these, see footprint.py.
+// exists under callgrind alone: a tick of each of these, see footprint.py.
 #include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -66,12 +65,12 @@ std::vector<RobotState> swing(const JointVector& center) {
   return states;
 }
 
-/// What a loop does besides.
+/// Options of the loop.
 struct Extra {
-  double ratio = 0;      ///< damping ratio that is held; 0: none
+  double ratio = 0;      ///< damping ratio of the design; 0: none
   bool loaded = false;   ///< a load and `jacobian_rate` are in the modes
-  bool steady = false;   ///< with what takes steady errors away
-  bool elastic = false;  ///< the gears bend
+  bool steady = false;   ///< with the integral and friction compensation
+  bool elastic = false;  ///< with elastic joints
 };
 
 /// A controller in the loop with a swinging arm.

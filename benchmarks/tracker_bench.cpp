@@ -1,16 +1,16 @@
-// The spectrum of a moving arm, call by call: a Panda whose joints swing by 0.5 rad, sampled at
-// 1 kHz, held by a Cartesian impedance (7 joints, 6 modes, one zero mode). `tracked` goes from
-// {M, C, W} to all modes with eigenvectors of both sides, frequencies, ratios and proved bounds;
-// `values_only` leaves out the eigenvectors; `reused` sees one system again and again. Beside them,
-// Eigen's fixed-size EigenSolver with right vectors and LAPACK's dgeev with both sides on the
-// 12 x 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
+// The spectrum of a moving arm, call by call: a Panda whose joints swing by 0.5 rad, sampled at 1
+// kHz, held by a Cartesian impedance (7 joints, 6 modes, one zero mode). `tracked` goes from {M, C,
+// W} to all modes with eigenvectors of both sides, frequencies, ratios and proved bounds;
+// `values_only` leaves out the eigenvectors; `reused` solves one system repeatedly. For comparison,
+// Eigen's fixed-size EigenSolver with right vectors and LAPACK's dgeev with both sides on the 12 x
+// 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
 // `eigen_full` (of run-time size) have n joints and n modes; `tracked/14` and `path_eigen/14` are a
-// Panda whose gears bend, and `tracked_link/14` is one whose links are measured;
+// Panda with elastic joints, and `tracked_link/14` is one whose links are measured;
 // `tracked_nonsymmetric` has the same path with a part of K and C that is not symmetric.
-// `backward_error` is the worst along the path, of every kRivalSteps-th system. `unproved` is what
-// a hostile system takes. `paced` and `evicted`, beside `eigen_...` and `lapack_...`, are timed
-// call by call: one in a millisecond, and after 64 MB of other data have passed through the caches.
-// What a loop has just written, the coefficients or the state matrix, is near the processor.
+// `backward_error` is the worst along the path, of every kRivalSteps-th system. `unproved` is the
+// time for a hostile system. `paced` and `evicted`, and `eigen_...` and `lapack_...` of them, are
+// timed call by call: one in a millisecond, and after 64 MB of other data have passed through the
+// caches. Coefficients or state matrix, just written by a loop, are near the processor.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/tests/support/arm_path.hpp>
@@ -38,7 +38,7 @@ using dashpot::testing::swing;
 using Eigen::MatrixXd;
 
 constexpr int kSteps = 1000;
-constexpr int kRivalSteps = 20;  ///< apart are the systems that rivals solve
+constexpr int kRivalSteps = 20;  ///< systems of the path for each that rivals solve
 constexpr unsigned kSeed = 20210002;
 
 /// One second of the path.
@@ -55,8 +55,8 @@ const std::vector<System<kMaxDof>>& panda_path(double ratio) {
   return path;
 }
 
-/// One second of the path of a Panda whose gears bend, with posture springs: 14 modes. If the links
-/// are measured, the stiffness is not symmetric.
+/// One second of the path of a Panda with elastic joints and posture springs: 14 modes. If the
+/// links are measured, the stiffness is not symmetric.
 std::vector<System<kMaxDof>> elastic_path(dashpot::controller::PositionSensor sensor) {
   dashpot::controller::ModelOptions options;
   options.drives = "fr3";
@@ -101,8 +101,8 @@ std::vector<System<kMaxDof>> full_path(int n) {
   return path;
 }
 
-/// A path whose stiffness and damping are not symmetric: n joints turn the forces of
-/// others by as much as a twentieth of their own.
+/// A path whose stiffness and damping are not symmetric: n joints turn the forces of others by as
+/// much as a twentieth of their own.
 std::vector<System<kMaxDof>> nonsymmetric_path(int n) {
   std::vector<System<kMaxDof>> path = full_path(n);
   std::mt19937_64 generator(kSeed);
@@ -119,7 +119,7 @@ std::vector<System<kMaxDof>> nonsymmetric_path(int n) {
   return path;
 }
 
-/// A = [0 G; -G' -D] of the motions that are no zero modes, in energy coordinates; the lower half y
+/// A = [0 G; -G' -D] of the motions other than zero modes, in energy coordinates; the lower half y
 /// of an eigenvector is the motion u = lift y of the joints.
 struct StateMatrix {
   MatrixXd A, lift;
@@ -242,8 +242,8 @@ void track(benchmark::State& state, const std::vector<System<kMaxDof>>& path,
   state.counters["backward_error"] = error;
 }
 
-/// The dearest update known: n coinciding modes at critical damping under a stiffness that is not
-/// symmetric, solved directly and not proved.
+/// The most expensive known update: n coinciding modes at critical damping under a stiffness that
+/// is not symmetric, solved directly and not proved.
 void unproved(benchmark::State& state, int n) {
   std::mt19937 engine(kSeed);
   std::uniform_real_distribution<double> small(-1e-6, 1e-6);
@@ -260,7 +260,7 @@ void unproved(benchmark::State& state, int n) {
   if (spectrum->status != Status::kUncertified) state.SkipWithError(to_text(spectrum->status));
 }
 
-/// What rivals solve.
+/// Systems for the rivals.
 struct RivalPath {
   std::vector<System<kMaxDof>> systems;
   std::vector<StateMatrix> matrices;

@@ -1,9 +1,9 @@
-"""What more workers bring to dashpot.audit and dashpot.design_region, and what they are sent.
+"""Throughput and data of more workers for dashpot.audit and dashpot.design_region.
 
 After ./run python:  build/python/numpy-2/bin/python benchmarks/workers.py [POSTURES]
 
 Prints the bytes of a task and of its result for each posture, the throughput of two workers beside
-that of two independent runs with one worker each, and the time of a region design.
+two independent runs with one worker each, and the time of a region design.
 """
 
 import concurrent.futures
@@ -31,7 +31,7 @@ def panda():
 
 
 class Counting(concurrent.futures.ThreadPoolExecutor):
-    """Counts what processes would be sent, and what they would send back."""
+    """Counts the data that processes would receive and send back."""
 
     sent = returned = chunks = seconds = 0
 
