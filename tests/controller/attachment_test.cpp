@@ -178,7 +178,7 @@ TEST(Attachment, MovesNoSpringWithTheTool) {
     ASSERT_LT((now.torque - last.torque).cwiseAbs().maxCoeff(), 0.05) << k;
     last = now;
   }
-  // From now on a pose is one of the new T: here it is where T is, so that the springs relax.
+  // From now on a pose refers to the new T: here it is the pose of T, so that the springs relax.
   arm.model = arm.model.with(Attachment({}, some_tool()));
   arm.setpoint.tip_pose = arm.tip();
   arm.setpoint.time = arm.state.time;

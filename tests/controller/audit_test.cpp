@@ -1,5 +1,5 @@
-// What gains do on an arm: against eigenvalues in long double, and closed forms. Margins are those
-// of the loop at a posture (tests/threads/one_loop_test.cpp), which
+// Results of gains on an arm, against eigenvalues in long double, and closed forms. Margins are
+// compared with the loop at a posture (tests/threads/one_loop_test.cpp), which
 // tests/sim/loop_stability_test.cpp steps tick by tick.
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/default_settings.hpp>
@@ -320,7 +320,7 @@ TEST(Audit, FindsSlowModeAndMarginOfOneJointWithAnIntegral) {
   const double l = -found.integral_decays[0];
   const double residual = ((kLinkInertia * l + kDamper) * l + kSpring) * l + kSpring / time;
   EXPECT_NEAR(residual / (kSpring / time), 0, 2e-4);
-  // Without a period there is no loop that it could be in.
+  // Without a period there is no sampled loop.
   one.options.period = 0;
   EXPECT_TRUE(one.audit().integral_decays.empty());
 }

@@ -99,7 +99,7 @@ TEST(BrakeLag, LeavesTheSampledLoopItsMargin) {
   }
 }
 
-/// A stop that takes long because the loop is late has to be asked for.
+/// A stop that is slow because the loop is late has to be set.
 TEST(BrakeLag, HasToBeToldWhereItIsLong) {
   const RobotModel model = testing::chain_of({"revolute", "revolute"});
   Settings settings = default_settings(model);
@@ -139,8 +139,8 @@ JointVector least_constraint(const AnyArm& any, const JointVector& wanted,
   return x;
 }
 
-/// A stop is -M qd / T where there is room for it, else the least constraint that another way
-/// finds, which never feeds the arm and takes no joint beyond 0.9 of its velocity limit.
+/// A stop is -M qd / T if there is room for it, otherwise the least constraint by another method,
+/// which never feeds the arm and moves no joint beyond 0.9 of its velocity limit.
 TEST_F(BrakeClaims, StopsWithTheLeastConstraintAndNeverFeeds) {
   int whole = 0, limited = 0;
   for (int arm = 0; arm < 20; ++arm) {
@@ -183,10 +183,10 @@ TEST_F(BrakeClaims, StopsWithTheLeastConstraintAndNeverFeeds) {
   EXPECT_GT(limited, 100);
 }
 
-/// From one torque to the next no more than the torque rate, also where a joint was driven.
+/// The torque changes at most by the torque rate, also where a joint was driven.
 TEST_F(BrakeClaims, KeepsTorquesAndTheirRates) {
   for (int arm = 0; arm < 20; ++arm) {
-    // 16 joints in a plane are hard to tell apart, and many bounds act at once.
+    // Bounds of 16 joints in a plane are nearly dependent, and many act at once.
     AnyArm any = arm > 0
                      ? AnyArm(engine)
                      : AnyArm(engine, testing::chain_of(std::vector<std::string>(16, "revolute")));
@@ -279,8 +279,8 @@ TEST_F(BrakeClaims, StopsBeforePositionLimits) {
   EXPECT_LE(beyond, 1);
 }
 
-/// What the brake remembers of earlier ticks spares it work and changes nothing: one that sees an
-/// arm for the first time gives the same torque, also where what the arm carries is dropped.
+/// Values that the brake keeps of earlier ticks save work and change nothing: a brake without them
+/// gives the same torque, also when the payload is dropped.
 TEST_F(BrakeClaims, RemembersNothingThatMatters) {
   int held = 0, ticks = 0;
   for (int arm = 0; arm < 12; ++arm) {
@@ -314,8 +314,8 @@ TEST_F(BrakeClaims, RemembersNothingThatMatters) {
   EXPECT_LT(held, 99 * ticks / 100);
 }
 
-/// A brake that feeds the arm is doubted before the arm is much faster than it may be pushed; one
-/// that stops it, holds a wrong weight, or is pushed by hand is not.
+/// A brake that feeds the arm is doubted before the arm is much faster than a hand may push it. A
+/// brake that stops the arm, holds a wrong weight, or is pushed by hand is not doubted.
 TEST_F(BrakeClaims, DoubtsABrakeThatFeeds) {
   for (int arm = 0; arm < 20; ++arm) {
     AnyArm any(engine);

@@ -1,4 +1,4 @@
-// What update() never does: allocate, call the system, or put out a torque above its limits.
+// update() never allocates, calls the system, or puts out a torque above its limits.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>
@@ -109,9 +109,9 @@ TEST(Realtime, HostileInputNeverGivesHostileTorque) {
       ASSERT_STREQ(watch.see(torque), nullptr) << "tick " << k;
     }
   }
-  // All but what needs a setting (kCollision, kWall, kLittleMargin), a robot that is not there
-  // (kInstability, kStateFrozen, kStateContradictory), or is not reached by finite input within its
-  // limits.
+  // All statuses, except those that need a setting (kCollision, kWall, kLittleMargin) or a missing
+  // robot (kInstability, kStateFrozen, kStateContradictory), or that finite input within its limits
+  // does not reach.
   const std::set<Status> rare = {Status::kCollision,    Status::kWall,
                                  Status::kLittleMargin, Status::kInstability,
                                  Status::kStateFrozen,  Status::kStateContradictory,

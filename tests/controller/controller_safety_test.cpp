@@ -1,5 +1,4 @@
-// What the robot itself may not do: limits of torque, velocity and position, and their safe
-// outputs.
+// Limits of the robot: torque, velocity and position, and their safe outputs.
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/safety.hpp>
 
@@ -111,7 +110,8 @@ TEST_F(Safety, OutsideAPositionLimitReturnsWhateverLatchedFirst) {
   EXPECT_GT(arm->state.position[3], lower);
 }
 
-// Thrown about by somebody: too fast is no broken sensor, and an arm that falls is damped.
+// A person throws the arm about: a high speed does not count as a broken sensor, and the arm is
+// damped.
 TEST_F(Safety, AFastRobotIsDampedHoweverFast) {
   settings.limits.beyond_model = true;
   settings.limits.tip_velocity = 100;
@@ -139,7 +139,7 @@ TEST_F(Safety, ABlowIsNoBrokenSensor) {
     make();
     run(1.0);
     double v = 0;
-    arm->state.time -= 1'000'000;  // that of the last tick
+    arm->state.time -= 1'000'000;  // the time of the last tick
     for (int k = 0; k < 3; ++k) {
       const double last = v;
       v += 1.4;  // 1400 rad/s^2
@@ -157,12 +157,12 @@ TEST_F(Safety, ABlowIsNoBrokenSensor) {
   }
 }
 
-/// After a pause in which somebody moved the arm it stays where it was put, released or not.
+/// After a pause in which a person moved the arm it stays where it was put, released or not.
 TEST_F(Safety, DoesNotDriveBackUnasked) {
   run(1.0);
   arm->state.time += 10'000'000'000;
   arm->state.position[3] += 0.4;
-  arm->fresh = false;  // nobody asks for anything
+  arm->fresh = false;  // there is no new set-point
   const JointVector put = arm->state.position;
   for (int k = 0; k < 3000; ++k) {
     if (k == 1500) arm->controller.release();

@@ -1,5 +1,5 @@
-// Damping ratios that are held in a sampled loop: how far they are lowered, and the margin that
-// the loop then has by its eigenvalues.
+// Damping ratios in a sampled loop: how far they are lowered, and the margin that the loop then has
+// by its eigenvalues.
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/gain_judge.hpp>
@@ -35,7 +35,7 @@ double margin_of(const LedArm& arm, double wanted) {
   return gain_margin(system, spectrum, loop, 1.2 * wanted);
 }
 
-/// Nothing interferes, and gains are in force at once.
+/// Nothing interferes, and gains act at once.
 Settings plain(const RobotModel& model, Mode mode) {
   Settings settings = testing::in_mode(testing::unlimited_settings(model), mode);
   settings.motion.gain_time = settings.period;
@@ -63,7 +63,7 @@ std::ostream& operator<<(std::ostream& out, What what) {
   return out << kNames[static_cast<int>(what)];
 }
 
-/// An arm with gains whose fastest mode is about as fast as the loop bears.
+/// An arm with gains whose fastest mode is near the limit of the sampled loop.
 class LevelCase {
  public:
   LevelCase(const testing::Arm& arm, What what, Random& random) : what_(what), random_(random) {
@@ -101,7 +101,7 @@ class LevelCase {
   }
 
   /// The arm at a random posture, at rest, with stiffness that makes the fastest mode about as fast
-  /// as the loop bears.
+  /// as the loop tolerates.
   void meet() {
     JointVector q = 2 * random_.vector(model->dof()).cwiseMax(-1).cwiseMin(1);
     if (what_ == What::kSingular) q *= random_.log_uniform(1e-4, 0.1);  // stretched out
@@ -132,7 +132,7 @@ class LevelCase {
 
   std::optional<RobotModel> model;
   Settings settings;
-  std::optional<LedArm> held, asked;  ///< with what the loop bears, and as asked for
+  std::optional<LedArm> held, asked;  ///< with the achievable damping, and with the given ratio
   Status status = Status::kOk;
 
  private:
@@ -192,8 +192,8 @@ JointVector drawn_in() {
   return JointVector{{0, -0.8, 0, -2.3, 0, 1.6, 0.8}};
 }
 
-/// From drawn in, where the loop bears the ratio, to stretched out upward, where the first joint
-/// has little inertia, and back: where the margin would be too little, the level falls before.
+/// From folded, where the loop tolerates the ratio, to stretched out upward, where the first joint
+/// has little inertia, and back: the level falls before the margin would be too small.
 TEST(HeldDamping, FallsAndRisesAlongAPath) {
   const RobotModel model = testing::smooth_panda();
   LedArm held(model, late(Mode::kJoint, 2)), asked(model, late(Mode::kJoint, 1));
@@ -281,8 +281,8 @@ TEST(HeldDamping, IsLeftAloneWhileSpringsStart) {
   }
 }
 
-/// A joint on its own. Without delay a damper c held for T bears c T / I = 2 / margin, whatever the
-/// spring.
+/// A joint on its own. Without delay a damper c held for T is stable up to c T / I = 2 / margin,
+/// whatever the spring.
 class OneJoint : public ::testing::Test {
  protected:
   static constexpr double kInertia = testing::kLinkInertia, kPeriod = 0.001;  // s
@@ -315,7 +315,7 @@ TEST_F(OneJoint, HasTheDampingThatItBears) {
   }
 }
 
-/// A spring is too much beyond k T^2 / I = 4 / margin, and one with less damping than k T / 2.
+/// A spring is too stiff beyond k T^2 / I = 4 / margin, or with less damping than k T / 2.
 TEST_F(OneJoint, SaysWhereNoShareKeepsTheMargin) {
   EXPECT_EQ(hold(1200, 0.7), Status::kOk);
   EXPECT_EQ(hold(1300, 0.7), Status::kLittleMargin);
@@ -327,7 +327,7 @@ TEST_F(OneJoint, SaysWhereNoShareKeepsTheMargin) {
   EXPECT_EQ(level(), 1);
 }
 
-/// What is judged is what will be in force.
+/// The gains that will be active are judged.
 TEST_F(OneJoint, IsJudgedWithTheDampingThatItBears) {
   Gains& gains = settings.initial.gains;
   gains.joint_damping_ratio = 2;

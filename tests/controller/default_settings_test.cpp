@@ -1,4 +1,4 @@
-// What the gains that the controller has by default do on every arm, wherever it may be.
+// Results of the default gains on every arm, at any posture.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/gain_judge.hpp>
@@ -48,7 +48,7 @@ Ratios ratios(const RobotModel& model, const Settings& settings, Mode mode) {
 class DefaultGains : public ::testing::TestWithParam<testing::Arm> {};
 
 TEST_P(DefaultGains, DampEveryModeOverTheWorkspace) {
-  ModelOptions smooth;  // friction adds to the ratios, and its size is the model's affair
+  ModelOptions smooth;  // friction adds to the ratios, and depends on the model
   smooth.viscous_friction = JointVector::Zero(testing::arm_model(GetParam()).dof());
   const RobotModel model = testing::arm_model(GetParam(), smooth);
   const Settings settings = default_settings(model);

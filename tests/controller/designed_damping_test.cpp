@@ -1,5 +1,5 @@
-// The controller designs its damping at every tick: the ratio is held, in the modes and in the
-// torque, beside friction and in either mode, and nothing jumps.
+// The controller designs its damping at every tick: modes and torque keep the ratio, with friction
+// and in either mode, and nothing jumps.
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
@@ -33,7 +33,7 @@ RobotModel rubbing(const testing::Arm& arm, double friction) {
   return testing::arm_model(arm, options);
 }
 
-/// Nothing but springs and the dampers that hold their ratio, with the friction taken off.
+/// Only springs, and dampers that keep their ratio, with the friction subtracted.
 Settings rubbing_settings(const RobotModel& model, Mode mode, Frame frame = Frame::kBase) {
   Settings settings = plain_settings(model, mode);
   settings.subtract_friction = true;
@@ -58,8 +58,8 @@ double worst_ratio(const Vibration& modes, double ratio = 0.7) {
   return worst;
 }
 
-/// Expects the damping ratio of the eigenvalues above 1 rad/s, in the dampers and springs in force;
-/// M and J are those of evaluate().
+/// Expects the damping ratio of the eigenvalues above 1 rad/s, in the active dampers and springs; M
+/// and J come from evaluate().
 void expect_true_ratios(const LedArm& led, double ratio, double tolerance) {
   analysis::System<kMaxJoints> published;
   led.controller.closed_loop(published);
@@ -86,7 +86,7 @@ void expect_true_ratios(const LedArm& led, double ratio, double tolerance) {
   EXPECT_GE(seen, 10);
 }
 
-// The friction is among what the published modes count, so that they are the judge.
+// Published modes include the friction, so that they are compared.
 TEST(DesignedDamping, HoldsTheRatioAlongAPathOfEveryArm) {
   const struct {
     Mode mode;
@@ -128,7 +128,7 @@ TEST(DesignedDamping, HoldsTheRatioAlongAPathOfEveryArm) {
 }
 
 TEST(DesignedDamping, LosesNoModesOfALongChain) {
-  // Modes that are near each other were lost once.
+  // Modes near each other were lost once.
   testing::RandomRobot random(20210001);
   const RobotModel model = RobotModel::from_urdf_text(random.chain(14, 0), "link0", "tip");
   Settings settings = testing::in_mode(testing::unlimited_settings(model), Mode::kCartesian);
@@ -164,8 +164,7 @@ TEST(DesignedDamping, LeavesFreeDirectionsAndTheNullSpaceAlone) {
             4);
 }
 
-/// What the dampers add to the torque is C of the published modes, less the friction, times the
-/// velocity.
+/// The dampers add C of the published modes, less the friction, times the velocity to the torque.
 TEST(DesignedDamping, IsInTheTorque) {
   for (const auto& [mode, frame] : {std::pair(Mode::kCartesian, Frame::kBase),
                                     {Mode::kCartesian, Frame::kTool},
@@ -198,7 +197,7 @@ TEST(DesignedDamping, FollowsChangesOfStiffnessAndRatio) {
     led.settle();
     expect_true_ratios(led, ratio, 1e-6);
   }
-  // Half-way between two stiffnesses in two frames the ratio is that of both.
+  // Half-way between two stiffnesses in two frames both have the ratio.
   gains.task_stiffness *= 8;
   gains.task_stiffness(0, 0) *= 3;
   gains.frame = Frame::kTool;
@@ -207,7 +206,7 @@ TEST(DesignedDamping, FollowsChangesOfStiffnessAndRatio) {
     led.tick();
     EXPECT_LE(worst_ratio(led.modes()), 1e-6);
   }
-  // And off: the damping that was given.
+  // And off: the given damping.
   gains.task_damping_ratio = 0;
   led.settle();
   gains.frame = Frame::kBase;
@@ -216,8 +215,8 @@ TEST(DesignedDamping, FollowsChangesOfStiffnessAndRatio) {
   EXPECT_TRUE(near(led.damping(), J.transpose() * gains.task_damping * J, 1e-9));
 }
 
-/// On, another, off: evenly over Motion::gain_time. With stiffness and frame, in the middle of a
-/// change and from mode to mode nothing jumps.
+/// On, another, off: evenly over Motion::gain_time. A change of stiffness and frame in the middle
+/// of another change, and from mode to mode, makes no jump.
 TEST(DesignedDamping, ChangesEvenly) {
   const RobotModel model = smooth_panda();
   LedArm led(model, plain_settings(model, Mode::kCartesian));
@@ -225,7 +224,7 @@ TEST(DesignedDamping, ChangesEvenly) {
   led.state.velocity.setConstant(0.3);
   led.tick();
   const auto law = [&]() -> JointVector { return led.controller.snapshot().law_torque; };
-  /// Largest step of the law's torque in so many ticks, and its change over all of them.
+  /// Largest step of the law's torque within a number of ticks, and its change over all of them.
   const auto change = [&](int ticks) {
     const JointVector first = law();
     JointVector last = first;
@@ -258,8 +257,8 @@ TEST(DesignedDamping, ChangesEvenly) {
   }
 }
 
-/// Springs that grow from zero, at first and after a reset, have their ratio from the start; those
-/// of the null space, too.
+/// Springs that grow from zero, at first and after a reset, have their ratio from the start, also
+/// in the null space.
 TEST(DesignedDamping, HoldsTheRatioWhileTheSpringsGrow) {
   const RobotModel model = smooth_panda();
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {

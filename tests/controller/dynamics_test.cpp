@@ -104,7 +104,7 @@ TEST(Dynamics, MassChangesAsDifferencesSay) {
   }
 }
 
-/// Where the makers' drawings and descriptions have it.
+/// The public descriptions have the same values.
 TEST(Dynamics, PutTheTipOfAnArmAtZeroWhereItIsPublished) {
   const std::map<std::string, Eigen::Vector3d> published = {
       {"panda", {0.088, 0, 0.8226}},     {"iiwa14", {0, 0, 1.306}},
@@ -138,8 +138,8 @@ TEST(Dynamics, OfAPendulumAreThoseOfTheTextbook) {
 
 TEST(Dynamics, OfThePandaGiveTheTranslationalModesOfThePaper) {
   // Kao and Saldarriaga, Fig. 1 and Table 1, printed as 9.755, 10.98, 20.25 rad/s with damping
-  // ratios 0.0294, 0.0316, 0.0255. The numbers below are those of the public model, with two
-  // fingers of 15 g; the paper's rotational modes hang on wrist inertias that differ from it.
+  // ratios 0.0294, 0.0316, 0.0255. The numbers below belong to the public model, with two fingers
+  // of 15 g; the paper's rotational modes depend on different wrist inertias.
   JointVector q(7);
   q << 0, -std::numbers::pi / 4, 0, -3 * std::numbers::pi / 4, 0, std::numbers::pi / 2,
       std::numbers::pi / 4;

@@ -1,4 +1,4 @@
-// Gears that bend: in the modes of the tick, and at a posture. The sampled loop with them is in
+// Elastic joints: in the modes of the tick, and at a posture. The sampled loop with them is in
 // tests/sim/elastic_prediction_test.cpp.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/controller.hpp>
@@ -30,7 +30,7 @@ using testing::LedArm;
 
 const double kInfinite = std::numeric_limits<double>::infinity();
 
-/// The motors of an arm, and what is told of its gears.
+/// The motors of an arm, and the data of its gears.
 ModelOptions gears(int n, double stiffness, PositionSensor sensor, double damping_ratio = 0.01) {
   ModelOptions options;
   options.viscous_friction = JointVector::LinSpaced(n, 0.5, 0.2);
@@ -42,7 +42,7 @@ ModelOptions gears(int n, double stiffness, PositionSensor sensor, double dampin
   return options;
 }
 
-/// Settings without limits, and with a brake that these gears bear.
+/// Settings without limits, and with a brake that these gears tolerate.
 Settings settings_of(const RobotModel& model, Mode mode) {
   Settings settings = testing::in_mode(testing::unlimited_settings(model), mode);
   settings.limits.stopping_time = 1;
@@ -100,8 +100,8 @@ Matrices springs_of(const RobotModel& model, const Gains& gains, Mode mode, cons
   return {{}, C, K};
 }
 
-/// The largest distance of an eigenvalue from the nearest true one beyond what is proved, relative
-/// to it and to a millionth of the largest. Each true one counts once.
+/// The largest distance of an eigenvalue from the nearest true one beyond its proved bound,
+/// relative to it and to a millionth of the largest. Each true one counts once.
 double worst_error(const Vibration& found, VectorXcd truth) {
   const double largest = truth.cwiseAbs().maxCoeff();
   double worst = 0;
@@ -116,7 +116,7 @@ double worst_error(const Vibration& found, VectorXcd truth) {
   return worst;
 }
 
-// An independent route: dense eigenvalues of the state matrix of 28 (24) states from the textbook's
+// Independent values: dense eigenvalues of the state matrix of 28 (24) states from the textbook's
 // blocks. The modes are tracked while the arm swings.
 TEST(ElasticJoints, HaveTheModesOfTheTextbookAtEveryTick) {
   for (const testing::Arm& arm : testing::arms()) {
@@ -259,7 +259,7 @@ TEST(ElasticJoints, AreStoppedByABrakeThatTheyBear) {
     EXPECT_DOUBLE_EQ(gears_stopping_time(motor, settings, 0.01), 0.002) << D;
     try {
       (void)gears_stopping_time(link, settings, 0.9 * T);
-      ADD_FAILURE() << "a brake that the gears do not bear, " << D;
+      ADD_FAILURE() << "a brake that the gears do not tolerate, " << D;
     } catch (const InvalidSettings& refused) {
       EXPECT_THAT(refused.what(), ::testing::HasSubstr("keeps a gain margin of 2 from "));
     }
@@ -287,7 +287,7 @@ TEST(ElasticJoints, MayBeSomeOfTheJoints) {
   for (std::size_t i = 0; i < 11; ++i) EXPECT_NEAR(found[i], nearly[i + 3], 1e-4 * found[i]) << i;
 }
 
-/// What a controller of the same gains has at rest.
+/// The loop of a controller with the same gains at rest.
 TEST(ElasticJoints, AreTheSameAtAPostureAndInAController) {
   for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
     for (const bool outside : {false, true}) {

@@ -1,4 +1,4 @@
-// How the controller comes back: from bad states, from faults, from set-points that grew old.
+// How the controller recovers from bad states, from faults, and from old set-points.
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/safety.hpp>
 
@@ -13,7 +13,7 @@ using testing::near;
 
 class Recovery : public testing::Safety {
  protected:
-  /// A tick with a position that is no number, `milliseconds` after the last.
+  /// A tick with a NaN position, `milliseconds` after the last.
   Status bad(int milliseconds = 1) {
     const JointVector position = arm->state.position;
     arm->state.position[2] = std::nan("");
@@ -29,7 +29,7 @@ class Recovery : public testing::Safety {
   }
 };
 
-/// What the bad states left is what acts, although there has been no torque before.
+/// The torque after bad states is the acting one, although there has been no torque before.
 TEST_F(Recovery, StartsFromZeroAfterBadStates) {
   arm->controller = Controller(model, settings);
   EXPECT_EQ(bad(), Status::kStateNotFinite);
@@ -45,7 +45,7 @@ TEST_F(Recovery, StartsFromZeroAfterBadStates) {
   EXPECT_TRUE(near(arm->torque, gravity(), 1e-9));
 }
 
-/// An outage is as long as the time from the last good state, however few states came meanwhile.
+/// An outage lasts from the last good state, however few states came meanwhile.
 TEST_F(Recovery, LatchesAfterTheLongestGapWithoutAGoodState) {
   run(1.0);
   next();
@@ -93,7 +93,7 @@ TEST_F(Recovery, FadesEvenlyAfterARamp) {
   EXPECT_TRUE(near(arm->torque, 0.5 * weight, 1e-6));
 }
 
-/// Whoever rests after a fault has to be seen to.
+/// A robot at rest after a fault must be watched.
 TEST_F(Recovery, RestsAnewAfterABadState) {
   settings.watchdog.release_after = 0.3;
   make();
@@ -121,7 +121,7 @@ TEST_F(Recovery, RestsAnewAfterABadState) {
   EXPECT_NEAR(ticks_to_release(), 300, 1);
 }
 
-/// The rest after one fault is none after the next.
+/// The rest after one fault does not count for the next.
 TEST_F(Recovery, RestsAnewAfterEachLawThatOverflows) {
   settings.watchdog.release_after = 0.3;
   settings.limits.beyond_model = true;
@@ -194,7 +194,7 @@ TEST_F(Recovery, EndsTheWrenchOfAStaleSetpoint) {
   EXPECT_NEAR(snapshot().tip_wrench[2], -8, 0.02);
 }
 
-/// A reflex that has lost its sensor protects nobody.
+/// Without a finite wrench, Limits::external_force protects no one.
 TEST_F(Recovery, AForceThatIsNoNumberIsACollisionWhereForcesAreWatched) {
   for (const double limit : {20.0, testing::kInfinity}) {
     settings.limits.external_force = limit;
@@ -210,7 +210,7 @@ TEST_F(Recovery, AForceThatIsNoNumberIsACollisionWhereForcesAreWatched) {
   }
 }
 
-/// A robot that holds its own weight has no external torque where it does.
+/// A robot that holds its own weight has no external torque from it.
 TEST_F(Recovery, TheWeightIsNoCollisionWhereTheRobotHoldsIt) {
   settings.feed_forward.gravity = false;
   settings.limits.external_torque.setConstant(4);

@@ -87,7 +87,7 @@ TEST_F(Judge, CountsTheCompensationOfFriction) {
   }
 }
 
-/// Walls, position limits and what the modes hold besides are no matter of gains.
+/// Walls, position limits and external damping do not matter for gains.
 TEST_F(Judge, KnowsNoLimits) {
   gains.joint_damping(0, 0) = borne() / 2.5;
   settings.limits.walls = {{{0, 0, 1}, Eigen::Vector3d::UnitZ()}};  // the tip is beyond it
@@ -97,7 +97,7 @@ TEST_F(Judge, KnowsNoLimits) {
 }
 
 /// The gravity compensation of a joint that falls away from its top grows by about w^2 (1/2 + 1) T
-/// with a torque that is a tick late, w^2 = m g l / I; what grows by less than 1/s does not count.
+/// with a torque that is a tick late, w^2 = m g l / I; growth below 1/s does not count.
 TEST_F(Judge, CountsTheGravityCompensationWhereItGrowsFast) {
   settings.analysis.sampled.delay = 1;
   gains.joint_damping(0, 0) = 1e-3;
@@ -127,8 +127,8 @@ TEST_F(Judge, JudgesDesignedDampingWithoutThePayload) {
     const bool enough = margin > GainJudge::kDropped;
     EXPECT_NEAR(found.margin, enough ? 3 : margin, 1e-3 * margin);
     EXPECT_EQ(found.dropped, !enough);
-    // This damper, but given, is judged with what is carried; so is an arm that carries
-    // nothing.
+    // The same damper without a ratio is judged with the payload only; so is an arm without
+    // payload.
     gains.joint_damping_ratio = 0;
     gains.joint_damping(0, 0) = damper;
     EXPECT_EQ(one.judge(q, gains).margin, 3);

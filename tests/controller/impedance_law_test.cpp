@@ -164,7 +164,7 @@ void expect_task_law(const RobotModel& model, Random& random,
   if (held == 0) return;
   const Impedance impedance(setpoint, n);
 
-  // Rows of held directions: S takes a twist in B's axes to their components.
+  // Rows of selected directions: S maps a twist in B's axes to their components.
   MatrixXd turn = MatrixXd::Identity(6, 6);
   if (gains.frame == Frame::kTool) {
     turn.topLeftCorner(3, 3) = turn.bottomRightCorner(3, 3) = one.kdl.R_BT.transpose();
@@ -233,7 +233,7 @@ TEST(Law, SumsTheModesByTheirWeights) {
     const VectorXd springs = (1 - s) * one.torque(joint, kNone, f) + s * one.torque(task, kNone, f);
     const double size = 1e-9 * (1 + plain.norm());
     EXPECT_TRUE(near(plain, springs, size));
-    NullSpace null_space;  // of directions that are held in part
+    NullSpace null_space;  // of directions that are selected in part
     null_space.compute(one.robot, impedance);
     const JointReference& joints = one.references.joint;
     const TipReference& tip = one.references.tip;

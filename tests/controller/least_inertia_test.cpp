@@ -1,4 +1,4 @@
-// The inertia that the tip has at least, between limits wherever they are on the circle.
+// The least inertia of the tip, between limits wherever they are on the circle.
 #include <dashpot/controller/model/least_inertia.hpp>
 #include <dashpot/tests/support/chains.hpp>
 #include <dashpot/tests/support/special_values.hpp>
@@ -28,7 +28,7 @@ class LeastInertia : public ::testing::Test {
   double of_elbow(double lower, double upper) const {
     return least_tip_inertia(model, both(-1, lower), both(1, upper)).linear;
   }
-  /// Expects the tip to have what it has with the other limits.
+  /// Expects the same inertia of the tip as with the other limits.
   void expect_same(double lower, double upper, double other_lower, double other_upper,
                    double share = 1e-9) const {
     SCOPED_TRACE(std::to_string(lower) + " to " + std::to_string(upper));
@@ -37,7 +37,7 @@ class LeastInertia : public ::testing::Test {
   const RobotModel model = testing::chain_of({"continuous", "continuous"});
 };
 
-/// A posture a turn away is the same one; more than a turn is a turn, and so is no limit.
+/// A posture a turn away is the same one; limits further apart, or none, allow a whole turn.
 TEST_F(LeastInertia, IsThatOfTheRangeOnTheCircle) {
   ASSERT_GT(std::abs(of_elbow(-0.5, 0.5) - of_elbow(1, 2)), 0.01);
   for (const double turns : {-2, -1, 1, 2}) {

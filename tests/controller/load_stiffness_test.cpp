@@ -60,7 +60,7 @@ struct HeldLoad {
     kernel.evaluate(there, rest, result);
     return result;
   }
-  /// Puts the springs' rest to where they hold the load. Returns the error e there.
+  /// Moves the springs' rest so that they hold the load. Returns the error e there.
   Vector6 hold() {
     const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
     Vector6 e = Vector6::Zero();
@@ -174,8 +174,8 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
   }
 }
 
-/// It holds where posture springs pull that were led elsewhere: N' and J# e change with q, and next
-/// to a singularity the inertia's regularisation as well.
+/// It also holds with deflected posture springs: N' and J# change with q, and next to a singularity
+/// the inertia's regularisation as well.
 TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
   Random random(415);
   double most = 0;
@@ -236,7 +236,7 @@ TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
   EXPECT_GT(regular, 60);
 }
 
-/// Under way N turns, so that its dampers brake what moved the tip alone a moment ago.
+/// In motion N turns, so that its dampers brake motions that moved only the tip a moment ago.
 TEST(LoadStiffness, OfDampersUnderWayIsTheirDerivative) {
   Random random(416);
   double most = 0;

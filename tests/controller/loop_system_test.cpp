@@ -44,7 +44,7 @@ struct Loop {
     null_space.compute(robot, impedance);
     nearly_singular = null_space.inertia().nearly_singular();
     analysis::System<kMaxJoints> plain, system;
-    for (analysis::System<kMaxJoints>* one : {&plain, &system}) {  // of what was there before
+    for (analysis::System<kMaxJoints>* one : {&plain, &system}) {  // of the earlier contents
       one->has_low_words = true;
       one->stiffness_factor.setOnes(3, 2);
     }
@@ -81,7 +81,7 @@ Setpoint tip_setpoint(Random& random, int n, Frame frame, int held) {
   return setpoint;
 }
 
-/// Returns in how many of twelve cases the null space could be told by itself.
+/// Returns the number of twelve cases whose null space has rows of its own.
 int expect_tip_springs(Random& random, int n) {
   int regular = 0;
   Loop loop(RobotModel::from_urdf_text(testing::RandomRobot(random.engine()()).chain(n, 0.2),
@@ -100,7 +100,7 @@ int expect_tip_springs(Random& random, int n) {
       if (loop.nearly_singular) continue;  // has a row for each joint instead
       ++regular;
       // Null-space springs in a single joint are not definite in all of the null space; dampers
-      // alone give no rows; nor does nothing at all.
+      // alone, or an empty null space, give no rows.
       const auto rows = [&] { return loop.expect_agreement(Impedance(setpoint, n)); };
       for (int i = 0; i < n && free > 1; ++i) {
         gains.null_stiffness = 30 * JointVector::Unit(n, i);

@@ -32,7 +32,7 @@ class WatchedPair : public ::testing::Test {
     robot.R_BT.setIdentity();
   }
   void make() { watch.emplace(model, settings); }
-  /// A tick at q and qd, and what is then applied: the weight and `excess`.
+  /// A tick at q and qd, and the torque then applied: the weight and `excess`.
   Status tick(const Pair& excess = Pair::Zero(), double dt = 0.001) {
     if (!watch) make();
     const Status status = watch->check({dt, q, qd, robot, wrench, still, brakes});
@@ -96,7 +96,7 @@ TEST_F(WatchedPair, KeepsToTheLimitsThemselves) {
 
 /// r after k ticks of a constant external torque is (1 - 0.9^k) times it.
 TEST_F(WatchedPair, EstimatesExternalTorqueWithATimeConstantOf10Milliseconds) {
-  for (const bool compensates : {true, false}) {  // or else the robot holds its weight itself
+  for (const bool compensates : {true, false}) {  // otherwise the robot holds its weight itself
     settings.feed_forward.gravity = compensates;
     settings.limits.external_torque = Pair(4, std::numeric_limits<double>::infinity());
     make();
@@ -167,7 +167,7 @@ TEST_F(WatchedPair, BelievesTheForceThatTheRobotReports) {
   EXPECT_EQ(tick(), Status::kCollision);
 }
 
-/// Half swings of so many ticks, each faster than the one before by `growth`.
+/// Half swings of this many ticks, each faster than the one before by `growth`.
 class GrowingSwings : public WatchedPair {
  protected:
   int ticks(double growth, double first, int half = 5, int most = 5000) {
@@ -193,8 +193,8 @@ TEST_F(GrowingSwings, LatchOnceTenHaveGrownAndTheyAreLarge) {
   EXPECT_EQ(ticks(1.05, 0.3, 5, 30), 0);
 }
 
-/// A vibration, beside a motion that is as fast and springs that move, is found within a second; a
-/// person who shakes the arm, what decays, and what is small are none.
+/// A vibration, beside a motion that is as fast and springs that move, is found within a second. A
+/// person who shakes the arm, a decay, and a small vibration do not count.
 TEST_F(WatchedPair, TellsVibrationsFromShaking) {
   const auto found = [&](double share, double hertz, double decay) {
     make();
@@ -259,8 +259,8 @@ TEST_F(WatchedPair, LatchesATorqueThatReversesAllTheTime) {
             0);
 }
 
-/// The time counts from when the torque exceeds what stiction may take up, however long the arm has
-/// stood: 5 % of 50 N m and three times 0.5 N m, or 15 % of 50 N m where no friction is known.
+/// The time counts from when the torque exceeds the stiction, however long the arm has stood: 5 %
+/// of 50 N m and three times 0.5 N m, or 15 % of 50 N m with unknown friction.
 TEST_F(WatchedPair, LatchesAStateThatStaysTheSameForTwoFifthsOfTheTime) {
   settings.watchdog.feedback = 0.5;
   const auto same = [](int) {};
@@ -299,8 +299,8 @@ TEST_F(WatchedPair, LatchesAStateThatStaysTheSameForTwoFifthsOfTheTime) {
   EXPECT_EQ(ticks_until(Status::kStateFrozen, same, [](int) { return Pair(-20, 0); }), 0);
 }
 
-/// Joint 2 moves by itself, and the brake asks for 50 N m against it: 1.9 rad/s are 1.8 J, and half
-/// of the velocity limits 1.5 J. The power that is missing is 95 W, of which 76.9 W may be.
+/// Joint 2 moves by itself, and the brake acts with 50 N m against it: 1.9 rad/s are 1.8 J, and
+/// half of the velocity limits 1.5 J. The missing power is 95 W, of which 76.9 W are allowed.
 TEST_F(WatchedPair, DoubtsABrakeThatTheEnergyDoesNotObey) {
   const auto doubted = [&](double speed, double torque, double deceleration) {
     make();
@@ -323,7 +323,7 @@ TEST_F(WatchedPair, DoubtsABrakeThatTheEnergyDoesNotObey) {
   EXPECT_EQ(doubted(1.9, -30, 0), 0) << "somebody pulls";
 }
 
-/// After a fault the weight alone acts, as before the freeze: that is no sign that it is over.
+/// After a fault the weight alone acts, as before the freeze: this does not end the fault.
 TEST_F(WatchedPair, IsFrozenUntilTheStateChanges) {
   settings.watchdog.feedback = 0.5;
   make();

@@ -53,7 +53,7 @@ TEST_F(NullSpaceOfPanda, DoesNotAccelerateTheDirectionsThatAreHeld) {
     at(random.vector(7));
     if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
     ++regular;
-    Jacobian J = robot.J;  // in the frame's axes, of what is held
+    Jacobian J = robot.J;  // in the frame's axes, of the selected directions
     if (in_tool) {
       J.topRows<3>() = (robot.R_BT.transpose() * J.topRows<3>()).eval();
       J.bottomRows<3>() = (robot.R_BT.transpose() * J.bottomRows<3>()).eval();
@@ -69,7 +69,7 @@ TEST_F(NullSpaceOfPanda, DoesNotAccelerateTheDirectionsThatAreHeld) {
     // What the spring does on its own: qdd = M^-1 N' K_0 dq, along which dq' K_0 dq falls.
     EXPECT_GE(robot.M.llt().solve(null_space.spring(k0, dq)).dot(k0.cwiseProduct(dq)), -1e-10);
     if (k % 2 == 0) continue;
-    const Vector6 a = random.vector(6);  // the inertia is that of the tip
+    const Vector6 a = random.vector(6);  // the inertia of the tip
     const MatrixXd mobility = J * robot.M.llt().solve(MatrixXd(J.transpose()));
     const MatrixXd wanted = mobility.inverse() * a;
     EXPECT_TRUE(near(null_space.inertia().wrench(a), wanted, 1e-8 * wanted.norm()));
@@ -106,7 +106,7 @@ TEST_F(NullSpaceOfPanda, EigenvaluesOfTheProjectorAreBetweenZeroAndOneEverywhere
   Random random(334);
   for (int k = 0; k < 200; ++k) {
     for (int i = 0; i < 6; ++i)
-      held.selected[i] = random.uniform(0, 1);  // half held, while blending
+      held.selected[i] = random.uniform(0, 1);  // selected in part, while blending
     for (int i = 0; i < 6; ++i) tool.selected[i] = (1 - held.selected[i]) * random.uniform(0, 1);
     held.selected *= 0.5;
     tool.selected *= 0.5;
@@ -122,8 +122,8 @@ TEST_F(NullSpaceOfPanda, EigenvaluesOfTheProjectorAreBetweenZeroAndOneEverywhere
   }
 }
 
-/// In coordinates z of the free motions (J Z z = 0) the springs' modes are those of Z' K_0 Z and
-/// Z' M Z: with one free motion, and with more.
+/// In coordinates z of the free motions (J Z z = 0) the springs' modes belong to Z' K_0 Z and Z' M
+/// Z: with one free motion, and with more.
 TEST_F(NullSpaceOfPanda, DampsFreeMotionsWithTheRatio) {
   Random random(77);
   for (int k = 0; k < 200; ++k) {

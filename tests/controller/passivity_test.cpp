@@ -1,5 +1,5 @@
-// What the law does to energy: kinetic, and that of its springs. The arm moves by the equations of
-// motion, without drives and sampling.
+// The energy under the law: kinetic energy and energy of the springs. The arm moves by the
+// equations of motion, without drives and sampling.
 #include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/constant_damping.hpp>
@@ -122,7 +122,7 @@ TEST(Passivity, SpringsKeepAllEnergyWithoutTheCoriolisFeedForward) {
   }
 }
 
-// With it the loop is that of the modes, whatever the speed; but 1/2 qd' dM/dt qd comes and goes.
+// With it the loop has the modes' equation at any speed, but 1/2 qd' dM/dt qd changes the energy.
 TEST(Passivity, TheCoriolisFeedForwardMayGiveEnergyAtSpeed) {
   Random random(342);
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {

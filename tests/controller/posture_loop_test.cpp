@@ -1,4 +1,4 @@
-// The closed loop at a posture, against that of a controller which runs there.
+// The closed loop at a posture, against the loop of a controller that runs there.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/posture_loop.hpp>
@@ -17,7 +17,7 @@ namespace {
 using Eigen::MatrixXd;
 using testing::near;
 
-/// Returns what a controller has at rest at q, once its gains are in force.
+/// Returns the loop of a controller at rest at q, once its gains are active.
 analysis::System<kMaxJoints> by_controller(const RobotModel& model, Settings settings, Mode mode,
                                            const JointVector& q, const Vector6& wrench) {
   settings.motion.gain_time = settings.period;

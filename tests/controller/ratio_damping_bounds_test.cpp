@@ -1,4 +1,4 @@
-// Damping designed for a ratio is bounded, semidefinite, and there, whatever it is designed for.
+// Damping designed for a ratio is bounded and semidefinite for any system.
 #include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
@@ -22,8 +22,8 @@ using testing::near;
 using testing::plain_settings;
 using testing::smooth_panda;
 
-/// Stretched, the arm loses a direction: the damping in the joints stays what the frequencies
-/// allow, and so does the torque.
+/// A stretched arm loses a direction: the joint damping stays as large as the frequencies allow,
+/// and so does the torque.
 TEST(DesignedDamping, IsBoundedThroughASingularity) {
   const RobotModel model = smooth_panda();
   Settings settings = plain_settings(model, Mode::kCartesian);
@@ -76,7 +76,7 @@ TEST(DesignedDamping, KeepsTheLastDesignWhereThereIsNone) {
     damper.update(broken, &J);
     EXPECT_EQ(damper.damping(), good);
   }
-  // A stiffness that rounding has made indefinite, as far as check_gains lets it pass, is taken.
+  // A stiffness that rounding has made indefinite, as far as check_gains accepts it, is accepted.
   Matrix6 flat = Vector6(100, 100, 100, 100, 100, -5e-9).asDiagonal();
   damper.set(flat, 0.35, {});
   damper.update(M, &J);
@@ -127,7 +127,7 @@ TEST(DesignedDamping, IsDesignedForWhatRoundingMadeSingular) {
   }
 }
 
-/// Springs that are taken away leave the dampers that were given beside their ratio.
+/// Without springs, the dampers given beside their ratio act.
 TEST(DesignedDamping, LeavesWhatWasGivenWhereThereIsNoStiffness) {
   const RobotModel model = testing::smooth_panda();
   const Settings defaults = default_settings(model);

@@ -51,7 +51,7 @@ struct Watch {
     EXPECT_LE(speed, 1 + 1e-9);
     EXPECT_LE(effort, 1 + 1e-6);
     EXPECT_LE(jerk, 1 + 1e-3);
-    EXPECT_LT(inconsistency, 1e-6);  // velocity and acceleration are those of the positions
+    EXPECT_LT(inconsistency, 1e-6);  // velocity and acceleration match the positions
   }
 };
 
@@ -70,7 +70,7 @@ TEST(JointReference, GoesStraightFromRestAndArrivesExactly) {
   ASSERT_EQ(path.position(), goal);
   EXPECT_EQ(path.velocity(), JointVector::Zero(3));
   watch.expect_within_limits();
-  EXPECT_GT(watch.speed, 0.99);  // no slower than it may be
+  EXPECT_GT(watch.speed, 0.99);  // no slower than the limit
   EXPECT_GT(watch.effort, 0.99);
   // As shares of the way: joint 2 limits the speed, joint 3 the acceleration; braking takes twice
   // as long as speeding up.
@@ -252,7 +252,7 @@ TEST(TipReference, GoesOnFromWhereItIsMovedToWhileItMovesAndTurns) {
     path.step(goal, turned);
     const Vector6 then = path.velocity();
     EXPECT_TRUE(near(path.position(), p + kPeriod * then.head<3>(), 1e-12));
-    // But for the axis of rotation, which the new place changes: a fraction of the small offset.
+    // Except for the axis of rotation, which the new place changes: a fraction of the small offset.
     const Quaterniond expected = quaternion(kPeriod * then.tail<3>()) * q;
     EXPECT_LT(path.rotation().angularDistance(expected), 1e-4);
     for (int k = 0; k < 10000; ++k) path.step(goal, turned);
@@ -275,7 +275,7 @@ TEST(JointReference, GoesOnFromWhereItIsMovedToWhileItMoves) {
   EXPECT_EQ(path.position(), goal);
 }
 
-// Started again in motion, a path is at rest and keeps nothing of before.
+// Started again in motion, a path is at rest and forgets its past.
 TEST(Paths, AreAtRestWhereTheyAreStarted) {
   TipReference tip({0.5, 1.5, 2.0, 6.0}, kPeriod, kWindow);
   JointReference joints(joint_limits(), kPeriod, kWindow);
@@ -298,7 +298,7 @@ TEST(Paths, AreAtRestWhereTheyAreStarted) {
   }
 }
 
-// What is near is within the clamp, up to half a turn; beyond 2 / pi of it that may be denied.
+// A near pose is within the clamp, up to half a turn; beyond 2 / pi of it this may be denied.
 TEST(ReferenceGovernor, SeesWhatIsNearUpToHalfATurn) {
   Random random(316);
   const TipImpedance base = all_sprung(), none;

@@ -1,4 +1,4 @@
-// What is wrong with a URDF or an option is said in one line that names it.
+// A fault of a URDF or an option is described in one line that names it.
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
@@ -188,7 +188,7 @@ TEST(RobotModelErrors, SpareWhatCanExist) {
                           "</link>" + joint("j", "a", "b") + joint("k", "b", "c", "planar")),
                     options),
             "no error")
-      << "what is left out";
+      << "links off the chain";
 }
 
 TEST(RobotModelErrors, NameWhatAcceptsAnImpossibleInertia) {

@@ -1,4 +1,4 @@
-// What a model takes from a URDF and from its options.
+// A model from a URDF and from its options.
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/dynamics_match.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
@@ -90,7 +90,7 @@ TEST(RobotModel, TakesReflectedInertiaAndFrictionFromTheOptions) {
   const RobotModel model = testing::arm_model(testing::arms()[0], options);
   EXPECT_EQ(model.joint_values(&Joint::viscous_friction), options.viscous_friction);
   EXPECT_EQ(model.joint_values(&Joint::coulomb_friction), options.coulomb_friction);
-  DynamicsResult expected = at(testing::arm_model(testing::arms()[0]));  // friction is no dynamics
+  DynamicsResult expected = at(testing::arm_model(testing::arms()[0]));  // without friction
   expected.M.diagonal() += options.reflected_inertia;
   EXPECT_TRUE(same_dynamics(at(model), expected, JointVector::Ones(7), 1e-14));
 }

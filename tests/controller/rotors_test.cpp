@@ -1,4 +1,4 @@
-// What a model does not tell of its rotors, how much would be enough, and the public figures.
+// Missing rotors of a model, the inertia that would be enough, and the published drives.
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/default_settings.hpp>

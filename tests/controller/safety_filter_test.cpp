@@ -32,7 +32,7 @@ class Filter : public ::testing::Test {
     robot.coriolis = pair(0, 0);
   }
   SafetyFilter make() const { return SafetyFilter(settings); }
-  /// Returns what the filter makes of `tau`.
+  /// Returns the output of the filter for `tau`.
   Status apply(SafetyFilter& filter, const Pair& tau) {
     out = tau;
     const JointVector position = q, velocity = qd, held = weight, damps = dampers;
@@ -84,7 +84,7 @@ TEST_F(Filter, LetsDampersGoFirst) {
   dampers = {-5, 6};
   EXPECT_EQ(apply(Pair(95, 3) + dampers), Status::kTorqueLimited);
   EXPECT_TRUE(near(out, Pair(-5, 6) + 32.0 / 95 * Pair(95, 3), 1e-12));
-  dampers = {0, 20};  // more than there is room for
+  dampers = {0, 20};  // more than the limits allow
   EXPECT_EQ(apply(Pair(8, 0) + dampers), Status::kTorqueLimited);
   EXPECT_TRUE(near(out, Pair(8, 10), 1e-12));
 }
@@ -105,7 +105,7 @@ TEST_F(Filter, GivesARobotNoEnergyThatIsAboutAsFastAsItsLimit) {
     const double left = std::clamp((0.9 - share) / 0.25, 0.0, 1.0);
     EXPECT_EQ(apply({30, 5}), left < 1 - 1e-9 ? Status::kTorqueLimited : Status::kOk) << share;
     EXPECT_TRUE(near(out, left * Pair(30, 5), 1e-9)) << share;
-    EXPECT_EQ(apply({-30, 5}), Status::kOk);  // takes more than it gives
+    EXPECT_EQ(apply({-30, 5}), Status::kOk);  // takes more energy than it gives
     EXPECT_TRUE(near(out, Pair(-30, 5), 1e-12));
   }
 }
@@ -120,7 +120,7 @@ TEST_F(Filter, RampsToZeroIn100Ticks) {
   EXPECT_EQ(ramp(filter), Pair(0, 0));
 }
 
-/// A ramp goes by the torque at its own beginning, not at that of the ramp before.
+/// A ramp depends on the torque at its own beginning, not at the beginning of the last ramp.
 TEST_F(Filter, RampsAnewAfterAGoodTick) {
   SafetyFilter filter = make();
   filter.reset(Pair(3, 0.5));
@@ -133,7 +133,7 @@ TEST_F(Filter, RampsAnewAfterAGoodTick) {
   EXPECT_TRUE(near(filter.last(), Pair(19.8, 3.96), 1e-9));
 }
 
-/// A law that gives no number leaves the weight, and a weight that is none nothing.
+/// A NaN of the law leaves the weight, and a NaN of the weight leaves the ramp.
 TEST_F(Filter, RampsDownWhatIsNotANumber) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   SafetyFilter filter = make();
@@ -147,7 +147,7 @@ TEST_F(Filter, RampsDownWhatIsNotANumber) {
   EXPECT_TRUE(std::isnan(filter.asked()[0]));
 }
 
-/// A filter that knows nothing starts from the weight, unless it has put out something.
+/// A filter without information starts from the weight, unless it has put out a torque.
 TEST_F(Filter, AssumesTheWeightWhereNothingIsKnown) {
   settings.limits.torque_rate.setConstant(1000);
   weight = {15, -3};
@@ -167,7 +167,7 @@ TEST_F(Filter, AssumesTheWeightWhereNothingIsKnown) {
   EXPECT_EQ(filter.last(), Pair(40, -10));
 }
 
-/// What the last torque has beyond the new one fades in all joints alike, as fast as the slowest
+/// The part of the last torque beyond the new one fades in all joints alike, as fast as the slowest
 /// allows.
 TEST_F(Filter, FadesEvenly) {
   settings.limits.torque_rate = Pair(1000, 500);
@@ -179,7 +179,7 @@ TEST_F(Filter, FadesEvenly) {
   }
   filter.begin_anew();
   for (int k = 1; k <= 16; ++k) {
-    apply(filter, {2, -80});  // of which a tenth is left
+    apply(filter, {2, -80});  // of which a tenth remains
     EXPECT_TRUE(near(out, k / 16.0 * Pair(0.2, -8), 1e-9)) << k;
   }
   // Without a new beginning each joint changes as fast as it may.
@@ -191,7 +191,7 @@ TEST_F(Filter, FadesEvenly) {
   EXPECT_TRUE(near(out, Pair(0.5, -1), 1e-9));
 }
 
-/// However what is asked for changes while the torque fades, each torque goes toward it.
+/// However the requested torque changes during the fade, each torque goes toward it.
 TEST_F(Filter, FadesTowardWhatIsAskedForNow) {
   settings.limits.torque_rate = Pair(1000, 500);
   SafetyFilter filter = make();
@@ -214,7 +214,7 @@ TEST_F(Filter, FadesTowardWhatIsAskedForNow) {
   }
 }
 
-/// What drives a joint that moves waits for no other joint where the arm is to stop.
+/// When the arm is to stop, torque that drives a moving joint waits for no other joint.
 TEST_F(Filter, LetsGoAtOnceOfAJointThatMoves) {
   settings.limits.torque_rate = Pair(1000, 500);
   settings.limits.velocity = Pair(2, 3);

@@ -37,15 +37,14 @@ Setpoint good_setpoint(Mode mode) {
   return setpoint;
 }
 
-/// The name of what is wrong; empty if nothing is.
+/// The name of the invalid member; empty if there is none.
 std::string fault(const Setpoint& setpoint, bool known_gains = false,
                   const Limits& limits = limits_of_two_joints()) {
   const SetpointFault found = check_setpoint(setpoint, limits, known_gains);
   return found ? found.key : "";
 }
 
-/// A value of a set-point, the name that a complaint gives it, one that passes and one that does
-/// not.
+/// A value of a set-point, its name in a complaint, a valid and an invalid number.
 struct Edge {
   Mode mode;
   std::string key;

@@ -27,7 +27,7 @@ class SetpointHistory : public testing::Safety {
     next();
   }
   double full() const { return settings.initial.gains.joint_stiffness(0, 0); }
-  /// Returns the stiffness of the first joint that is in force.
+  /// Returns the current stiffness of the first joint.
   double stiffness() {
     const double before = snapshot().law_torque[0];
     arm->state.position[0] += 1e-3;
@@ -80,7 +80,7 @@ TEST_F(SetpointHistory, HasModesAtTheFirstTickAfterAReset) {
   }
 }
 
-/// A controller that was neither reset nor given a set-point holds with the gains of its settings.
+/// A controller without a reset or a set-point holds with the gains of its settings.
 TEST_F(SetpointHistory, HoldsFromTheFirstTickWithTheGainsOfTheSettings) {
   arm->controller = Controller(model, settings);
   arm->setpoint = Setpoint();
@@ -137,7 +137,7 @@ TEST_F(SetpointHistory, ShowsNoErrorOfATipThatIsNotHeld) {
   EXPECT_EQ(snapshot().reference_tip.position, snapshot().tip.position);
 }
 
-/// The path of the tip is as fast as it may be where the joints are not.
+/// The path of the tip is as fast as allowed where the joints do not limit it.
 TEST_F(SetpointHistory, TheTipGoesAsFastAsItMay) {
   settings.limits.beyond_model = true;
   settings.limits.velocity.setConstant(20);

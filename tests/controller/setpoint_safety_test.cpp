@@ -50,7 +50,7 @@ TEST_F(Safety, RejectsBadSetpointsAndKeepsTheLastGoodOne) {
     EXPECT_EQ(tick(), Status::kSetpointRejected);
     EXPECT_TRUE(near(arm->torque, gravity(), 1e-6));
     arm->state.time += 1'000'000;
-    EXPECT_EQ(tick(), Status::kSetpointRejected);  // looked at once, reported while it stands
+    EXPECT_EQ(tick(), Status::kSetpointRejected);  // checked once, reported as long as it stays
     arm->setpoint = good;
     EXPECT_EQ(next(), Status::kOk);
     EXPECT_EQ(snapshot().restarts, 1u);
@@ -120,7 +120,7 @@ TEST_F(Safety, ASetpointFarAheadIsRejectedEvenIfNothingHolds) {
   EXPECT_EQ(next(), Status::kSetpointRejected);
 }
 
-/// The tip is told to hold a pose that it cannot reach.
+/// The goal is a pose that the tip cannot reach.
 class OutOfReach : public Safety {
  protected:
   OutOfReach() {
@@ -141,11 +141,11 @@ TEST_F(OutOfReach, SpringsAreDrawnOutNoFartherThanTheirReach) {
   arm->setpoint.tip_pose.position.y() += 5;
   double largest = 0;
   for (int k = 0; k < 5000; ++k) {
-    next();  // something keeps the robot where it is
+    next();  // an obstacle stops the robot
     largest = std::max(largest, clamped());
   }
   EXPECT_LT(largest, 0.2 + 1e-9);
-  EXPECT_NEAR(clamped(), 0.2, 1e-6);  // it pulls as hard as it may
+  EXPECT_NEAR(clamped(), 0.2, 1e-6);  // it pulls with its largest force
   EXPECT_TRUE(snapshot().reference_twist.isZero(1e-6));
   const double pull = settings.initial.gains.task_stiffness(1, 1) * 0.2;
   EXPECT_NEAR(snapshot().tip_wrench[1], pull, 1e-3 * pull);

@@ -1,4 +1,4 @@
-// Sine and cosine in lanes against those of the C library in extended precision.
+// Sine and cosine in lanes against the C library in extended precision.
 #include <dashpot/controller/base/sin_cos.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/special_values.hpp>

@@ -59,7 +59,7 @@ TEST(Smoothing, MovesAsLongAsOneCoordinateDoes) {
   }
 }
 
-// At rest all rounding is gone: what comes then is what comes of a new one, to the last bit.
+// At rest all rounding errors are gone: the next motion equals a new one's to the last bit.
 TEST(Smoothing, KeepsNothingOfAMotionThatHasEnded) {
   Random random(352);
   Smoothing<JointVector> used(10, 3), fresh(10, 3);
@@ -139,8 +139,7 @@ Step one_step(double d, double v) {
 }
 
 TEST(Approach, EndsWithinATickWhereItCan) {
-  // A speed of d / T that may be had at once, and half the acceleration limit to brake: d <= a
-  // T^2/2
+  // A possible speed of d / T, and half the acceleration limit to brake: d <= a T^2/2
   const double farthest = 0.5 * 5 * kTick * kTick;
   for (const double share : {-0.999, 0.5, 0.999}) {
     const auto step = one_step(share * farthest, 0);
@@ -160,7 +159,7 @@ TEST(Approach, SpeedsUpAtItsLimitAndBrakesAtHalfOfIt) {
   EXPECT_DOUBLE_EQ(one_step(-100, 0).velocity, -5 * kTick);
   EXPECT_DOUBLE_EQ(one_step(100, 2).velocity, 2);
   EXPECT_NEAR(one_step(-100, 2).velocity, 2 - 5 * kTick, 1e-15);
-  // With k periods to go it has slowed down to k times what it may brake in one.
+  // With k periods to go it has slowed down to k times the braking of one period.
   const double braking = 0.5 * 5 * kTick;
   for (const int k : {1, 2, 3, 10, 100}) {
     const double d = braking * kTick * k * (k + 1) / 2;

@@ -123,7 +123,7 @@ TEST(Orthonormalize, TellsWhatIsLeftOfAVector) {
         EXPECT_NEAR(Q[static_cast<std::size_t>(j)].dot(y), i == j ? 1 : 0, 1e-15);
       }
     }
-    // Little is left of a vector next to their span, but that is orthogonal to all its digits.
+    // The small remainder of a vector next to their span is orthogonal to all its digits.
     JointVector beside = random.vector(5);
     ASSERT_TRUE(orthonormalize(Q.data(), 3, 1e-3, beside));
     JointVector y = Q[0] - 2 * Q[1] + Q[2] + 1e-6 * beside;

@@ -78,7 +78,7 @@ TEST_F(Check, CountsAPeriodWhereTheClockGoesBack) {
   EXPECT_DOUBLE_EQ(check->age(), 0.002);
 }
 
-/// A gap of longest_gap is none: rates are counted on across it.
+/// A gap of longest_gap does not count: rates are counted across it.
 TEST_F(Check, TellsAGapFromAShortInterruptionToTheNanosecond) {
   make();
   EXPECT_EQ(next(10), Status::kOk);
@@ -93,7 +93,7 @@ TEST_F(Check, TellsAGapFromAShortInterruptionToTheNanosecond) {
   for (int k = 1; k < 50; ++k) EXPECT_EQ(next(10), Status::kOk);
   EXPECT_EQ(next(11), Status::kTimeGap);
   EXPECT_EQ(next(10), Status::kOk);
-  make();  // and so do bad states for longer, whatever comes between them
+  make();  // and so do bad states for longer, also with good ones between
   for (int k = 1; k < 50; ++k) EXPECT_EQ(next(10), Status::kOk);
   for (int k = 0; k < 10; ++k) EXPECT_EQ(bad(), Status::kStateNotFinite);
   EXPECT_EQ(next(), Status::kOk);
@@ -126,12 +126,12 @@ TEST_F(Check, JudgesTheRateAnewAfterAGap) {
   }
 }
 
-/// With all velocities zero, what is unexplained is all that was travelled, u, and u > tolerance +
-/// 0.3 u is noticed. Of what was, 1 - T / 0.5 s is left a tick later.
+/// With all velocities zero, all travelled distance u is unexplained, and u > tolerance + 0.3 u is
+/// noticed. A tick later 1 - T / 0.5 s of it remains.
 TEST_F(Check, NoticesPositionsThatMoveOtherwiseThanTheVelocitiesSay) {
   settings.watchdog.feedback = 0.5;
   for (const auto& [joint, tolerance] : {std::pair(0, 0.02), {1, 0.02}, {2, 0.005}}) {
-    for (const double said : {0.0, 0.5, 2.0}) {  // of what moves
+    for (const double said : {0.0, 0.5, 2.0}) {  // of the motion
       make();
       const double v = 0.4, step = 1e-3 * v, larger = step * std::max(1.0, said);
       double unexplained = 0, travelled = 0;
@@ -175,7 +175,7 @@ TEST_F(Check, TakesVelocitiesFromPositionsAfterAContradiction) {
     next();
   }
   state.velocity[0] = 0;
-  for (int k = 0; k < 2000; ++k) next();  // what was unexplained fades
+  for (int k = 0; k < 2000; ++k) next();  // the unexplained motion fades
   for (const bool trusted : {false, true}) {
     if (trusted) check->trust_velocities();
     const double before = check->velocity()[0];
@@ -186,7 +186,7 @@ TEST_F(Check, TakesVelocitiesFromPositionsAfterAContradiction) {
   }
 }
 
-/// States that agree with each other for more than 20 ms are followed, even if they are elsewhere.
+/// States that agree with each other for more than 20 ms are accepted, even if they are elsewhere.
 TEST_F(Check, BelievesAJumpAfter20MillisecondsOfAgreement) {
   for (const double milliseconds : {1.1, 3.0, 7.0}) {
     make();
@@ -224,7 +224,7 @@ TEST_F(Check, BelievesNoJumpsThatDisagree) {
   }
 }
 
-/// Angles of a continuous joint may come modulo a turn; those of a hinge may not.
+/// Angles of a continuous joint may come modulo a turn; a hinge's angles may not.
 TEST_F(Check, FollowsAContinuousJointAcrossItsWrap) {
   constexpr double kWrap = 2 * std::numbers::pi;
   make();
@@ -241,7 +241,7 @@ TEST_F(Check, FollowsAContinuousJointAcrossItsWrap) {
   EXPECT_EQ(next(), Status::kStateJump);
 }
 
-/// Where whole turns have no exact remainder any number would do.
+/// Far away, where whole turns have no exact remainder, any number would do.
 TEST_F(Check, TakesNoGarbageForAnAngle) {
   for (const double garbage : {1.1e6, 1e16, -1e17, 1e20, -1e300}) {
     for (const double last : {0.0, 0.5}) {

@@ -16,7 +16,7 @@ using testing::kInfinity;
 using testing::near;
 using testing::Safety;
 
-/// What spoils a state, and what it is called; a jump is believed after a while, see below.
+/// A disturbance of a state, and its status; a jump is accepted after some time, see below.
 struct Spoiler {
   Status status;
   void (*spoil)(RobotState& state);
@@ -87,7 +87,7 @@ TEST_P(LongRamp, HoldsTheWeightForTwoSecondsAndStartsAfresh) {
   EXPECT_EQ(snapshot().restarts, 2u);
 }
 
-/// Where time stamps are wrong and positions are good, the weight is held and the brake acts.
+/// If time stamps are wrong and positions are good, the weight is held and the brake acts.
 TEST_F(Safety, WrongTimeStampsDropNoArm) {
   const std::vector<std::function<std::int64_t(std::int64_t)>> clocks = {
       [](std::int64_t) { return 0; },                      // stands still
@@ -103,7 +103,7 @@ TEST_F(Safety, WrongTimeStampsDropNoArm) {
     std::int64_t passed = 0;
     for (int k = 0; k < 1500; ++k) {
       arm->state.time = from + clocks[clock](passed += 1'000'000);
-      arm->state.external_wrench[0] = k >= 400 && k < 418 ? 10 : 0;  // somebody bumps into it
+      arm->state.external_wrench[0] = k >= 400 && k < 418 ? 10 : 0;  // a person bumps into it
       arm->setpoint.time = arm->state.time;
       arm->fresh = false;
       const std::int64_t told = arm->state.time;
@@ -118,7 +118,7 @@ TEST_F(Safety, WrongTimeStampsDropNoArm) {
   }
 }
 
-/// An encoder that slips, or wraps by a turn: nobody knows which state is right.
+/// An encoder that slips, or wraps by a turn: the right state is unknown.
 TEST_F(Safety, AStateThatStaysElsewhereLatchesAndIsFollowedWithoutSprings) {
   for (const double slip : {0.3, 2 * 3.14159265358979}) {
     make();
@@ -166,7 +166,7 @@ TEST_F(Safety, GoesOnAfterBadStatesWhileMoving) {
   EXPECT_TRUE(near(arm->torque, before, 1.0));
 }
 
-/// What moves otherwise than it says is damped by what the positions say.
+/// If velocities contradict the positions, the brake uses the positions.
 TEST_F(Safety, VelocitiesThatContradictThePositionsLatch) {
   settings.watchdog.feedback = 0.5;
   for (const double scale : {0.0, -1.0, 3.0}) {
@@ -196,7 +196,7 @@ TEST_F(Safety, AStateThatNeverChangesWhileTheTorqueDoesLatches) {
   settings.watchdog.feedback = 0.5;
   make();
   run(1.0);
-  for (int k = 0; k < 1000; ++k) next();  // at rest that is all right
+  for (int k = 0; k < 1000; ++k) next();  // at rest there is no contradiction
   EXPECT_EQ(snapshot().fault, Status::kOk);
   arm->setpoint.joint_position[1] += 0.5;
   int ticks = 0;
@@ -208,7 +208,7 @@ TEST_F(Safety, AStateThatNeverChangesWhileTheTorqueDoesLatches) {
   EXPECT_LT(ticks, 1500);
   for (int k = 0; k < 300; ++k) next();
   EXPECT_TRUE(near(arm->torque, gravity(), 1e-6));
-  // Feedback that is back damps, although the fault is not released.
+  // Good feedback damps again, although the fault is not released.
   for (int k = 0; k < 300; ++k) {
     arm->state.velocity[1] = 0.3;
     arm->state.position[1] += 1e-3 * arm->state.velocity[1];
@@ -237,8 +237,8 @@ TEST_F(Safety, AStateThatFreezesInACreepingMotionLatches) {
   }
 }
 
-/// Swings that grow are an instability, also where a reference lost its springs while it moved: it
-/// does not count as moving.
+/// Swings that grow are an instability, also if a reference lost its springs in motion: it does not
+/// count as moving.
 TEST_F(Safety, SwingsThatGrowAfterAChangeOfModeLatch) {
   settings.motion.gain_time = 0.002;
   make();
@@ -270,7 +270,7 @@ TEST_F(Safety, AWallIsNotCrossed) {
   arm->setpoint.tip_pose.position.z() += 0.02;
   EXPECT_LT(arm->step(), Status::kSetpointRejected);
   for (int k = 0; k < 3000 && snapshot().fault == Status::kOk; ++k) {
-    arm->state.external_wrench[2] = -0.05 * k;  // somebody pushes
+    arm->state.external_wrench[2] = -0.05 * k;  // a person pushes
     arm->step();
   }
   EXPECT_EQ(snapshot().fault, Status::kWall);
@@ -331,7 +331,7 @@ TEST_F(Safety, AnExternalWrenchThatIsNotFiniteIsReportedAndChangesNothing) {
   EXPECT_EQ(snapshot().restarts, 1u);
 }
 
-/// What moved when the state was lost is braked by what the model says of it.
+/// The motion at the loss of the state is braked by the motion that the model predicts.
 TEST_F(Safety, BrakesAMotionThatNobodySeesAnyMore) {
   run(1.0);
   const JointVector weight = gravity();

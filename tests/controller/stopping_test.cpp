@@ -1,4 +1,4 @@
-// The time and way that a stop is promised to take, beside closed forms for one joint.
+// The promised time and distance of a stop, beside closed forms for one joint.
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/settings_check.hpp>
@@ -17,7 +17,7 @@ using ::testing::StartsWith;
 constexpr double kInertia = 2;      // kg m^2
 constexpr double kBegin = 0.9 * 2;  // rad/s
 
-/// A joint about a vertical axis, which bears no weight.
+/// A joint about a vertical axis, which carries no weight.
 RobotModel turntable() {
   return RobotModel::from_urdf_text(
       R"(<robot name="turntable"><link name="base"/><joint name="turn" type="continuous">
@@ -49,7 +49,7 @@ TEST(Stopping, TakesTheTimeAndWayOfTheClosedForm) {
   EXPECT_NEAR(weak.way[0],
               (kBegin * kBegin - slow * slow) * kInertia / (2 * torque) + T * (slow - 0.1 * kBegin),
               0.004);
-  // The torque rises at its rate until half of the speed is left, and falls at it.
+  // The torque rises at its rate until half of the speed remains, and falls at it.
   const double rate = 50;
   EXPECT_NEAR(
       stop(1e4, rate).time[0],

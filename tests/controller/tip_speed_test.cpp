@@ -41,7 +41,7 @@ TEST(TipSpeed, IsOnlyEverLowered) {
   EXPECT_EQ(arm.controller.snapshot().fault, Status::kTipSpeedLimit);
 }
 
-/// The reference of the joint mode is as slow as that of the tip, on the way and while it changes.
+/// The reference of the joint mode is as slow as the tip's, on the way and while it changes.
 TEST(TipSpeed, SlowsTheJointModeToo) {
   DASHPOT_SKIP_IF_QUICK();
   Settings settings = testing::quiet_settings(testing::panda_model());

@@ -1,4 +1,4 @@
-// URDFs as people have them: newer versions, shapes, limits, inertias and units that are doubtful.
+// URDFs in practice: newer versions, shapes, limits, inertias and doubtful units.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
@@ -63,7 +63,7 @@ JointVector bent() {
   return q;
 }
 
-/// Whether the models have the same M, weight and tip, but for rounding.
+/// Returns true if the models have the same M, weight and tip, except for rounding.
 void expect_same(const RobotModel& model, const RobotModel& other) {
   const DynamicsResult a = evaluate(model, bent(), bent()), b = evaluate(other, bent(), bent());
   EXPECT_LT((a.M - b.M).cwiseAbs().maxCoeff(), 1e-13);
@@ -140,7 +140,7 @@ TEST(UrdfForms, StateNoLimitByZero) {
   EXPECT_EQ(model.joints()[0].effort, std::numeric_limits<double>::infinity());
 }
 
-/// Where no joint has a limit of effort, nobody commands torques before limits.torque is told.
+/// If no joint has a limit of effort, limits.torque has to be set before any torque is commanded.
 TEST(UrdfForms, WantTorquesWhereNoneIsStated) {
   const RobotModel model =
       read_panda(std::regex_replace(read_urdf_file(testing::arm_path("panda")),
@@ -151,7 +151,7 @@ TEST(UrdfForms, WantTorquesWhereNoneIsStated) {
               ThrowsMessage<InvalidSettings>(HasSubstr("limits.torque: missing: no joint of the")));
   settings.limits.torque.setConstant(7, 80);
   EXPECT_NO_THROW((void)Controller(model, settings));
-  // Where some state one, the others are named, and zeros are no torques that are missing.
+  // If some joints state one, the others are named, and a zero torque does not count as missing.
   const RobotModel other = read_panda(panda_with("effort=\"87\"", "effort=\"0\""));
   EXPECT_THAT(other.warnings(), Contains(HasSubstr("no limit): panda_joint1: a controller")));
   settings.limits.torque.setZero();

@@ -32,7 +32,7 @@ std::string refusal_of_file(const std::string& path) {
   return refusal_of([&] { RobotModel::from_urdf_file(path, "link0", "link1"); });
 }
 
-/// A hinge from link0 to link1, on which a chain of so many more links hangs. Names are too long
+/// A hinge from link0 to link1, on which a chain of this many more links hangs. Names are too long
 /// for strings to hold without allocating.
 std::string long_chain(int links, const std::string& more = "") {
   const std::string tail = "_of_a_chain_that_is_very_long";

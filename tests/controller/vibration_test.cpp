@@ -52,7 +52,7 @@ std::vector<LongComplex> eigenvalues_now(const Controller& controller) {
 }
 
 /// Each published eigenvalue is one of `truth`, one to one. Returns the largest relative error;
-/// what is as good as zero counts as a millionth of the largest eigenvalue.
+/// eigenvalues near zero count as a millionth of the largest eigenvalue.
 double worst_error(const Vibration& modes, std::vector<LongComplex> truth) {
   double worst = 0;
   long double largest = 0;
@@ -106,7 +106,7 @@ TEST(VibrationInTheTick, IsWhatADirectSolutionGivesThere) {
   }
 }
 
-// Which two real eigenvalues form a mode must not depend on how the gains came to be what they are.
+// Which two real eigenvalues form a mode must not depend on the history of the gains.
 TEST(VibrationInTheTick, PairsRealEigenvaluesAsADirectSolutionDoes) {
   for (const testing::Arm& description : testing::arms()) {
     const RobotModel model = testing::arm_model(description);

@@ -1,4 +1,4 @@
-// Modes from within the tick: what is computed, what is left out, and what is forgotten.
+// Modes from within the tick: which steps are computed, skipped and forgotten.
 #include <dashpot/controller/vibration/vibration.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/hostile_ticks.hpp>
@@ -57,14 +57,14 @@ TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
   EXPECT_EQ(after.tick, before.tick + 100);
   EXPECT_EQ(after.time, led.state.time);
   expect_same_eigenvalues(after, before);
-  // The smallest motion that there is matters.
+  // The smallest representable motion matters.
   led.state.position[3] = std::nextafter(led.state.position[3], 0.0);
   led.tick();
   EXPECT_EQ(led.counters().unchanged, after.counters.unchanged);
   EXPECT_EQ(led.modes().origin, SpectrumOrigin::kTracked);
 }
 
-// A robot that is damped at the same spot before and after a reset: nothing changed, and yet there
+// A robot that is damped at the same posture before and after a reset: nothing changed, but there
 // is nothing to repeat.
 TEST(VibrationInTheTick, RepeatsNothingFromBeforeAReset) {
   SmallSwing led(Mode::kJoint, [](Settings& settings) {
@@ -79,7 +79,7 @@ TEST(VibrationInTheTick, RepeatsNothingFromBeforeAReset) {
   EXPECT_EQ(led.counters().unchanged, 0U);
 }
 
-/// One that was to be solved directly may be missed; the next one then is.
+/// A task that was to be solved directly may be missed; the next one then is.
 TEST(VibrationSolver, SolvesAnewAfterATaskThatItMissed) {
   VibrationSolver solver(Analysis{});
   Vibration result;
@@ -101,7 +101,7 @@ TEST(VibrationSolver, SolvesAnewAfterATaskThatItMissed) {
   EXPECT_EQ(result.counters.missed, 1);
 }
 
-/// A change of gains is no standing still.
+/// A change of gains does not count as standing still.
 TEST(VibrationInTheTick, SeesGainsChange) {
   SmallSwing led(Mode::kJoint);
   led.settle();
@@ -203,7 +203,7 @@ TEST(VibrationInTheTick, LeavesOutTermsThatAreZero) {
   EXPECT_EQ(loaded.tracked, still.tracked + 99);
 }
 
-/// Whatever the analysis makes of hostile input, the torque is what it is without.
+/// Hostile input of the analysis does not change the torque.
 TEST(VibrationInTheTick, NeverTouchesTheTorque) {
   const RobotModel model = panda_model();
   Settings settings = testing::HostileTicks::everything_on(model);
@@ -230,7 +230,7 @@ TEST(VibrationInTheTick, NeverTouchesTheTorque) {
 
 TEST(VibrationInTheTick, ForgetsAtAReset) {
   SmallSwing first(Mode::kCartesian), again(Mode::kCartesian);
-  again.setpoint.mode = Mode::kJoint;  // its modes are not those of the Cartesian mode
+  again.setpoint.mode = Mode::kJoint;  // its modes differ from the Cartesian mode's
   again.swing_from(0, 600);
   again.setpoint.mode = Mode::kCartesian;
   again.controller.reset();

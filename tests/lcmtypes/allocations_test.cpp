@@ -1,4 +1,4 @@
-// The real-time side allocates nothing, and bytes of unknown origin make nobody allocate much.
+// The real-time side allocates nothing, and bytes of unknown origin cause no large allocation.
 #include <dashpot/lcmtypes/command_receiver.hpp>
 #include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
@@ -32,7 +32,7 @@ TEST(Allocations, DoNotHappenWhereSamplesAreOffered) {
     const StateSample state = random_state(random, n);
     const ModesSample modes = random_modes(random, n);
     const int seen = allocations_of([&] {
-      for (int i = 0; i < 20; ++i) {  // more than there is room for
+      for (int i = 0; i < 20; ++i) {  // more than fit
         publisher.offer(state);
         publisher.offer(modes);
       }
@@ -59,7 +59,7 @@ TEST(Allocations, DoNotHappenWhereCommandsAreFetched) {
   EXPECT_EQ(setpoint.joint_position.size(), 7);
 }
 
-/// Decodes bytes of which this place says another size.
+/// Decodes bytes of which this place states another size.
 template <class Message>
 void expect_few_allocations(Bytes bytes, std::size_t offset, std::int32_t size) {
   write_int32(bytes, offset, size);

@@ -1,4 +1,4 @@
-// Which commands count, and what they set.
+// Which commands count, and their effect.
 #include <dashpot/lcmtypes/command_filter.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
 #include <dashpot/tests/support/special_values.hpp>
@@ -108,7 +108,7 @@ TEST_F(CommandFilters, EndsARatioWithGainsOfTheSamePart) {
   EXPECT_EQ(setpoint.gains.joint_damping_ratio, message.joint_damping_ratio);
 }
 
-/// A sender's numbers may begin with 1, and a speed that a later command does not name is none.
+/// A sender's numbers may begin with 1; a speed that a later command does not name has no limit.
 TEST_F(CommandFilters, ForgetsASpeedThatIsNotNamedAgain) {
   message.parts = command_t::TIP_SPEED;
   message.sequence = 1;
@@ -133,7 +133,7 @@ TEST_F(CommandFilters, KeepsDampersBesideARatioUnlessThereAreOthers) {
   EXPECT_EQ(setpoint.gains.task_damping, before.task_damping);
   EXPECT_EQ(setpoint.gains.joint_damping, before.joint_damping);
   EXPECT_EQ(setpoint.gains.task_damping_ratio, message.task_damping_ratio);
-  // Without a ratio zeros are what they say.
+  // Without a ratio zeros count as zeros.
   ASSERT_EQ(judge_parts(int{command_t::TASK_GAINS} + int{command_t::JOINT_GAINS}),
             Verdict::kAccepted);
   apply(filter.command(), setpoint, 1);
@@ -143,7 +143,7 @@ TEST_F(CommandFilters, KeepsDampersBesideARatioUnlessThereAreOthers) {
 
 TEST_F(CommandFilters, LeavesAloneWhatNoCommandSet) {
   message.parts = command_t::JOINT_POSITION;
-  message.wrench[0] = kNaN;  // not one of the parts: not looked at
+  message.wrench[0] = kNaN;  // not one of the parts: not checked
   ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
   controller::Setpoint before;
   before.wrench = random.vector(6);
@@ -168,7 +168,7 @@ TEST_F(CommandFilters, AddsUpThePartsOfSeveralCommands) {
   apply(filter.command(), setpoint);
   EXPECT_EQ(setpoint.wrench[0], first.wrench[0]);
   EXPECT_EQ(setpoint.tip_pose.position[0], second.tip_position[0]);
-  // What the first command set does not come back with the second.
+  // The values of the first command do not come back with the second.
   controller::Setpoint later;
   apply(filter.command(), later, 1);
   EXPECT_EQ(later.wrench[0], 0);

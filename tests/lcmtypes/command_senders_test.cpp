@@ -1,4 +1,4 @@
-// Who commands: one sender at a time, whatever others send; and what a release has to name.
+// Who commands: one sender at a time, whatever others send; and how a release names its fault.
 #include <dashpot/lcmtypes/command_filter.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
 
@@ -91,7 +91,7 @@ TEST_F(CommandSenders, OneThatGivesUpIsFollowedAtOnce) {
   EXPECT_EQ(shared.tally().commander, 2);
 }
 
-// What was recorded of a sender counts no more than before once it has given up.
+// A recorded command counts no more than before once its sender has given up.
 TEST_F(CommandSenders, ARecordingCountsForNobody) {
   command_t recorded = command_of(1);
   EXPECT_EQ(arrive(shared, recorded), Verdict::kAccepted);
@@ -131,7 +131,7 @@ TEST_F(CommandSenders, AFloodOfAnotherTakesNothingFromTheOneThatCommands) {
   EXPECT_EQ(judged, kRounds + 1);
 }
 
-// Nobody commands, and one sends so many commands that are not taken that no more would be.
+// Without a commander, one sender sends more refused commands than the bucket holds.
 TEST_F(CommandSenders, WhoeverBeginsToCommandFindsTheBucketFull) {
   CommandLimits limits = limits_for(7);
   limits.most_per_second = 100;
@@ -194,12 +194,12 @@ TEST_F(CommandSenders, AreRememberedAsLongAsTheirCommandsCouldBeReplayed) {
 
 TEST_F(CommandSenders, AReleaseNamesTheFaultThatIsLatched) {
   const std::int32_t release = command_t::RELEASE;
-  EXPECT_EQ(send_parts(1, release, 0), Verdict::kNoSuchFault);  // there is none
+  EXPECT_EQ(send_parts(1, release, 0), Verdict::kNoSuchFault);  // there is no fault
   EXPECT_EQ(send_parts(1, release, 500), Verdict::kNoSuchFault);
   const command_t before = [this] {
     command_t message = command_of(1);
     message.parts = command_t::RELEASE;
-    message.fault_tick = 400;  // all that its sender can know before the fault at 500
+    message.fault_tick = 400;  // the latest fault that its sender can know before 500
     return message;
   }();
   shared.set_fault_tick(500);
@@ -213,7 +213,7 @@ TEST_F(CommandSenders, AReleaseNamesTheFaultThatIsLatched) {
   EXPECT_EQ(send_parts(1, release, 500), Verdict::kAccepted);
   EXPECT_TRUE(has_set(shared.command(), release, 0));
   EXPECT_EQ(shared.command().fault_tick, 500);
-  // Whatever comes next brings it no second time, and the next fault has another name.
+  // No later message repeats the release, and the next fault has another name.
   pass(kMillisecond);
   EXPECT_EQ(send_parts(1, command_t::WRENCH), Verdict::kAccepted);
   EXPECT_FALSE(has_set(shared.command(), release, 1));
@@ -248,7 +248,7 @@ TEST_F(CommandSenders, TheControllerIsAskedLastAndItsReasonKept) {
   EXPECT_EQ(filter.command().accepted, 1);
   EXPECT_EQ(filter.command().setpoint.gains.task_stiffness(0, 0), judged[0]);
   EXPECT_EQ(judged.size(), 2U);
-  // Not asked about what is out of order otherwise, or comes of others.
+  // Commands that are refused otherwise, or come from others, are not judged.
   good = true;
   message.sequence = ++last_sequence;
   EXPECT_EQ(arrive(filter, message), Verdict::kAccepted);

@@ -82,7 +82,7 @@ TEST(Log, IsReplayedByTheStockPlayer) {
   const std::vector<Event> replayed = read_log(scratch.path("b.lcm"));
   ASSERT_EQ(replayed.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    EXPECT_EQ(replayed[i].bytes, expected[i].bytes) << i;  // times are those of the replay
+    EXPECT_EQ(replayed[i].bytes, expected[i].bytes) << i;  // with the times of the replay
   }
 }
 
@@ -127,7 +127,7 @@ std::string event_bytes(const std::string& channel, const std::string& data,
   return bytes + channel + data;
 }
 
-/// The channels of the events that are read from these bytes, and what is said of the log.
+/// The channels of the events in these bytes, and the description of the log.
 std::pair<std::string, std::string> channels_of(const std::string& bytes) {
   const Scratch scratch;
   LogFile log(scratch.write("a.lcm", bytes));
@@ -169,7 +169,7 @@ TEST(Log, SaysWhereItIsCutOffOrDamaged) {
     EXPECT_EQ(channels_of(a + b.substr(0, kept)), Said("A ", "cut off in the event at byte 34"))
         << kept;
   }
-  EXPECT_EQ(channels_of(a + "junk that is no event"),
+  EXPECT_EQ(channels_of(a + "junk and not an event"),
             Said("A ", "damaged at byte 34, 21 bytes skipped"));
   EXPECT_EQ(channels_of("junk" + b + "junk" + a.substr(0, 30)),
             Said("B ",

@@ -161,7 +161,7 @@ TYPED_TEST(MessageCheck, SurvivesRandomMutations) {
       ASSERT_GE(message.n, 1);
       ASSERT_LE(message.n, controller::kMaxJoints);
     }
-    ASSERT_EQ(bytes_of(message), bytes) << "case " << i;  // nothing was made up or left out
+    ASSERT_EQ(bytes_of(message), bytes) << "case " << i;  // nothing was added or left out
   }
   std::printf("seed %llu: %d cases, %d still well-formed\n", static_cast<unsigned long long>(kSeed),
               kCases, good);

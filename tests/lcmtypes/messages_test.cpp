@@ -1,4 +1,4 @@
-// What the messages say is what the samples said, and their definitions keep their promises.
+// The messages contain the samples, and their definitions do not change.
 #include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
 #include <dashpot/tests/support/places.hpp>
@@ -25,7 +25,7 @@ Eigen::Matrix3d rotation_of(const double (&q)[4]) {
   return R;
 }
 
-// Everyone who was built against these definitions relies on them. A change is a new type, with a
+// Programs that were built against these definitions rely on them. A change is a new type, with a
 // new name, or a new major version.
 TEST(Messages, KeepTheirFingerprints) {
   EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0x2735b759af8e3e26u);

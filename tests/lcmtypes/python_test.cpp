@@ -1,4 +1,4 @@
-// A log read in Python, with types from the stock generator, says what was published.
+// A log read in Python, with types from the stock generator, contains the published samples.
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
 #include <dashpot/tests/support/places.hpp>

@@ -210,7 +210,7 @@ TEST(ConfigRefuses, WhatIsBeyondTheModel) {
                                  "-1, -2, -1, 0, -1]}"));
 }
 
-/// Returns what is wrong with the robot; `keys` follow urdf, base and tip.
+/// Returns the error of the robot; `keys` follow urdf, base and tip.
 std::string complaint_about(const std::string& keys) {
   std::string text = panda();
   text.insert(text.size() - 2, keys);

@@ -28,7 +28,7 @@ inline controller::Config load(const std::string& text) {
 inline std::string load_refusal(const std::string& path) {
   return testing::refusal<controller::InputError>([&] { controller::load_config(path); });
 }
-/// Returns what load_config says about `text`, without the file's name in front.
+/// Returns the error of load_config for `text`, without the file's name in front.
 inline std::string complaint(const std::string& text) {
   const Scratch scratch;
   const std::string path = scratch.write("arm.yaml", text);

@@ -464,7 +464,7 @@ TEST(ConfigExample, ShowsDefaults) {
   EXPECT_EQ(config.settings.initial.gains.directions, none.initial.gains.directions);
 }
 
-/// Every key that the reader says it knows stands in the example.
+/// Every key that the reader knows stands in the example.
 TEST(ConfigExample, ShowsEveryKey) {
   const std::string example = text_of(kExample);
   const std::string robot = "robot: {urdf: u, base: b, tip: t";

@@ -1,4 +1,4 @@
-// The configurations for `dashpot drive`: what their gains do wherever the arm may be.
+// The configurations for `dashpot drive`: results of their gains at any posture.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/tests/plugin/config_file.hpp>

@@ -80,12 +80,12 @@ TEST_F(Judging, TakesWhatIsBetterThanWhatIs) {
   EXPECT_GT(found.verdict.margin, found.before);
   EXPECT_FALSE(change(damper, damper, nothing).taken);
   EXPECT_FALSE(change(damper, 1.05 * damper, nothing).taken);
-  // A body that helps,
+  // A payload that raises the margin,
   found = change(damper, damper, body);
   EXPECT_TRUE(found.taken);
   EXPECT_GT(found.verdict.margin, found.before);
   EXPECT_EQ(judgement->attached(), body);
-  // and is put down again: alone it harms, with other gains it does not.
+  // and is put down again: without it these gains have too little margin, other gains have enough.
   EXPECT_FALSE(change(damper, damper, nothing).taken);
   EXPECT_EQ(judgement->attached(), body);
   found = change(damper, 0.5 * damper, nothing);

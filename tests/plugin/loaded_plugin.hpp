@@ -1,5 +1,5 @@
 #pragma once
-// The plugin as a host without Dashpot's headers for C++ has it: loaded at run time.
+// The plugin for a host without Dashpot's headers for C++: loaded at run time.
 
 #include <dashpot/controller/plugin.h>
 #include <dashpot/tests/plugin/config_file.hpp>
@@ -39,7 +39,7 @@ struct Destroy {
 };
 using Handle = std::unique_ptr<dashpot_controller, Destroy>;
 
-/// Nothing but its size.
+/// Returns a struct with only its size set.
 template <class Struct>
 Struct sized() {
   Struct result{};
@@ -47,7 +47,7 @@ Struct sized() {
   return result;
 }
 
-/// Gains of an arm of seven joints of which none is given.
+/// Gains of an arm of seven joints, all of them NULL.
 inline dashpot_gains panda_gains() {
   auto gains = sized<dashpot_gains>();
   gains.joints = 7;

@@ -28,7 +28,7 @@ inline void simulate(const controller::RobotModel& model, Host& host, double per
   Eigen::Map<Eigen::VectorXd>(host.position.data(), velocity.size()) = q + period * velocity;
 }
 
-/// Ticks with this set-point, after each of which the arm moves; none may complain.
+/// Ticks with this set-point, after each of which the arm moves; all must succeed.
 inline void run_simulated(const controller::RobotModel& model, Host& host, int ticks,
                           const dashpot_setpoint* setpoint = nullptr) {
   for (int tick = 0; tick < ticks; ++tick) {

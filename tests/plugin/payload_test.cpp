@@ -24,7 +24,7 @@ dashpot_payload payload(double mass, const double* tool_position = nullptr) {
   return result;
 }
 
-/// A Panda at rest that is configured to carry something.
+/// A Panda at rest with a configured payload.
 Host carrying_host(const std::string& carried, const std::string& settings) {
   std::string text = panda();
   text.replace(text.rfind('}'), 1, ", payload: {" + carried + "}}");
@@ -38,7 +38,7 @@ Host carrying_host(const std::string& carried, const std::string& settings) {
   return host;
 }
 
-/// Gains of its own, because the default ones depend on what is configured.
+/// Gains of its own, because the default ones depend on the configuration.
 const std::string kGains =
     std::string(kCartesian) +
     "gains: {task: {stiffness: [500, 500, 500, 30, 30, 30], damping: [40, 40, 40, 3, 3, 3]}, "
@@ -113,7 +113,7 @@ TEST(PluginPayload, IsJudgedWithTheGainsThatComeWithIt) {
   const JointGains soft(50, 5), hard(300, 60);
   dashpot_payload nothing = payload(0);
   ASSERT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_UNSTABLE_GAINS);
-  // Refused with what comes with it, nothing of both is in force.
+  // A payload that is refused changes nothing, and its gains change nothing.
   nothing.gains = &hard.gains;
   ASSERT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_UNSTABLE_GAINS);
   dashpot_gains wrong{};
@@ -163,7 +163,7 @@ TEST(PluginPayload, HasToLeaveRatioDampingItsMarginOnceItIsDropped) {
   soft.task_stiffness = K.data();
   body.gains = &soft;
   EXPECT_EQ(plugin().set_payload(arm, &body), DASHPOT_OK) << plugin().last_error();
-  // So has one that is configured.
+  // A configured payload has the same effect.
   std::string text = panda();
   text.replace(text.rfind('}'), 1,
                ", payload: {mass: 3, center: [0, 0, 0.05], inertia: [0.1, 0.1, 0.1]}}");

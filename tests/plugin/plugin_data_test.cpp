@@ -51,8 +51,7 @@ void expect_padded(const std::vector<std::pair<const double*, Eigen::VectorXd>>&
     EXPECT_EQ(seen(found, DASHPOT_MAX_JOINTS), expected);
   }
 }
-/// Returns what is made of something of three joints at 77 ns, in memory that was full of other
-/// things.
+/// Returns the result for something of three joints at 77 ns, in memory with other contents.
 template <class Struct, class From>
 Struct filled(const From& from) {
   Struct out;

@@ -1,5 +1,5 @@
-// The modes of what acts beside springs and dampers: the integral, and friction compensation at the
-// measured velocity. Predicted z against those of the linear map that fits simulated motion.
+// The modes of the integral, and of friction compensation at the measured velocity. Predicted z
+// against the linear map that fits simulated motion.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
@@ -45,7 +45,7 @@ class ActingModes : public ::testing::TestWithParam<ActingTerms> {
     options.coulomb_friction.setConstant(6, 0.5);
     twin.model = arm_model(testing::arms()[2], options);
   }
-  /// The state of the loop; of the integral what is stored for the mode.
+  /// The state of the loop, with the part of the integral for the mode.
   static VectorXd state(const ReleasedArm& arm, const JointVector& q0) {
     VectorXd x(GetParam().integral ? 18 : 12);
     x.head<6>() = arm.plant().position() - q0;
@@ -123,7 +123,7 @@ TEST_P(ActingModes, AreThoseOfTheSimulatedMotion) {
     settings.feed_forward.friction_at = FeedForward::FrictionAt::kMeasured;
     settings.feed_forward.friction_rise = 1;
   }
-  // Smaller ones are lost in rounding, larger ones in what is not linear: see below.
+  // Smaller ones are lost in rounding, larger ones in nonlinearity: see below.
   constexpr double kSize = 3e-8;
   const std::vector<Complex> found = seen(settings, q0, kSize, random);
   const std::vector<Complex> found_far = seen(settings, q0, 100 * kSize, random);
@@ -184,7 +184,7 @@ TEST_P(ActingModes, AreThoseOfTheSimulatedMotion) {
   }
   EXPECT_LT(worst_mode, 5e-6);
   EXPECT_LT(worst_rate, 3e-5);  // alike, so that they are harder to fit
-  // What is left is not linear in the motion, and no part of the prediction: it grows with it.
+  // The remaining error is nonlinear in the motion, and not predicted: it grows with it.
   EXPECT_GT(far_mode, 10 * worst_mode);
   if (param.integral) {
     EXPECT_GT(far_rate, 10 * worst_rate);

@@ -1,4 +1,4 @@
-// What acts on an arm beside gravity and torque: friction, stops, a wall, pushes; and the audit.
+// Forces on an arm beside gravity and torque: friction, stops, a wall, pushes; and the audit.
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/sim/scenes.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -91,7 +91,7 @@ class Bounce {
     return -depth(contact_) - rate(contact_) * after - kG / 2 * after * after;
   }
   double leaves_at() const { return fall_ + contact_; }
-  /// Returns the heat of the damper, and of the spring that is left behind pressed, J.
+  /// Returns the heat of the damper and of the spring that remains pressed, J.
   double heat() const {
     const double v = rate(contact_), d = depth(contact_);
     return kMass * kG * (height_ + d) - kMass / 2 * v * v;
@@ -156,7 +156,7 @@ TEST_P(Contacts, AreMetWithinAStepByFixedSteps) {
   }
 }
 
-/// What a step leaves for the next one is of no use where a contact has changed the forces.
+/// The last evaluation of a step does not serve the next one if a contact has changed the forces.
 TEST_P(Contacts, AreLandedOnByAdaptiveSteps) {
   const Bounce expected(height, contact);
   Arm arm(slider(kDown), options());
@@ -215,7 +215,7 @@ class Audit : public ::testing::TestWithParam<testing::ChainFile> {};
 INSTANTIATE_TEST_SUITE_P(Arms, Audit, ::testing::ValuesIn(testing::arm_files()),
                          [](const auto& instance) { return instance.param.name; });
 
-/// An arm that swings through everything a scene may have.
+/// An arm that swings through every force of a scene.
 struct Scene {
   RobotParameters parameters;
   ArmOptions options;

@@ -101,8 +101,8 @@ TEST_P(Dynamics, FallDownTheGradientOfTheGravityEnergy) {
   }
 }
 
-/// The controller's own model of the same file: friction apart, they must agree with no KDL
-/// between.
+/// The controller's own model of the same file: without friction they must agree, without KDL
+/// between them.
 TEST_P(Dynamics, UndoWhatTheModelOfTheControllerAsksFor) {
   Random random(707);
   const int n = testing::robot_of(file()).dof();

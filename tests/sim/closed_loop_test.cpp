@@ -1,5 +1,5 @@
-// Arms under the real controller in simulation: rest stays rest, pushes are answered, and energy
-// comes from nowhere but the hold.
+// Arms under the real controller in simulation: rest stays rest, pushes are damped, and energy
+// comes only from the hold.
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 
@@ -29,7 +29,7 @@ class ClosedLoop : public ::testing::TestWithParam<testing::Arm> {
     const VectorXd omega{{8, 11, 14, 18, 23, 30}};
     return tip_gains(twin, q, omega, VectorXd::Constant(6, zeta), 0, random);
   }
-  /// One that the drives can hold with torque to spare.
+  /// An impedance that the drives can hold with torque to spare.
   JointVector posture() {
     const JointVector limit = twin.model.joint_values(&controller::Joint::effort);
     for (;;) {
@@ -38,7 +38,7 @@ class ClosedLoop : public ::testing::TestWithParam<testing::Arm> {
       if ((robot.gravity.cwiseAbs().array() < 0.6 * limit.array()).all()) return q;
     }
   }
-  /// Springs toward the posture besides, where there is a self-motion.
+  /// Also springs toward the posture, where there is a self-motion.
   void hold_posture(const JointVector& q, controller::Gains& gains) {
     if (twin.dof() == 6) return;
     const double softness = self_motion(twin, q).squaredNorm();
@@ -147,8 +147,8 @@ TEST_P(ClosedLoop, KeepsToTheTorqueLimits) {
 
 // ----------------------------------------------------------------------------------------- energy
 
-/// Returns the energy of motion and springs, J: 1/2 qd' M qd + 1/2 e' K_C e. For stiffness that is
-/// the same in all directions of rotation, and apart from that of translation, the second is a
+/// Returns the energy of motion and springs, J: 1/2 qd' M qd + 1/2 e' K_C e. For a stiffness that
+/// is the same in all directions of rotation, and not coupled with translation, the second is a
 /// potential of the law's springs however far they stretch.
 double energy(const TwinModels& twin, const JointVector& q0, const Vector6& stiffness,
               const sim::Plant& plant) {
@@ -178,7 +178,7 @@ EnergyRun run(const TwinModels& twin, const JointVector& q0, const JointVector& 
   sim::PlantOptions options;
   options.integrator.max_step = step;
   controller::Settings settings = release_settings(twin, gains, period);
-  settings.feed_forward.coriolis = false;  // which would take the mechanism's own work away
+  settings.feed_forward.coriolis = false;  // which would cancel the mechanism's own work
   ReleasedArm arm(twin, settings, q0, dq, options);
   EnergyRun result;
   double last = result.start = energy(twin, q0, stiffness, arm.plant());
@@ -204,7 +204,7 @@ TEST_P(ClosedLoop, LosesEnergyAtEveryTickWithEnoughDamping) {
   }
 }
 
-/// C = 0: what energy the loop gains is that of the hold, and halves with the period.
+/// C = 0: the loop gains energy only from the hold, and half as much with half the period.
 TEST_P(ClosedLoop, GainsNoEnergyButThroughTheHold) {
   const TwinModels smooth(GetParam(), false);
   for (int i = 0; i < 2; ++i) {
@@ -233,8 +233,7 @@ TEST_P(ClosedLoop, BalancesItsBooksToTheIntegratorsOrder) {
 }
 
 /// From a stretched elbow to a pose far away. The tip's reference may be fast there one degree
-/// further on, and if it were so at once, the elbow would swing at 9 Hz with a quarter of its
-/// limit.
+/// further on; if it were so at once, the elbow would swing at 9 Hz with a quarter of its limit.
 TEST(ClosedLoopOfAStretchedArm, LeavesItsSingularityWithoutVibrating) {
   const testing::Arm iiwa{"iiwa14", "iiwa_link_0", "iiwa_link_ee_kuka"};
   const TwinModels twin(iiwa);

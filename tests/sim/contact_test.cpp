@@ -1,5 +1,5 @@
-// The stiffness that a loop bears, against plants in simulation: the growth of a touch on both
-// sides of the limit tells where it turns.
+// The stable contact stiffness of a loop, against plants in simulation: the growth of a touch on
+// both sides of the limit shows where it changes sign.
 #include <dashpot/controller/contact_audit.hpp>
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/tests/support/mujoco_arm.hpp>
@@ -59,8 +59,8 @@ struct TouchedPanda {
   }
 };
 
-/// Growth a tick of a fast motion, from what step() says of its place: the change of the size of
-/// its second differences, which slow motions hardly have.
+/// Growth a tick of a fast motion, from the positions of step(): the change of the size of its
+/// second differences, which slow motions hardly have.
 template <class Step>
 double growth_rate(int ticks, const Step& step) {
   double before[2] = {step(), step()}, sizes[2] = {0, 0};
@@ -73,8 +73,8 @@ double growth_rate(int ticks, const Step& step) {
   return 0.5 * std::log(sizes[1] / sizes[0]) / third;
 }
 
-/// The stiffness where growth(k) turns, between nearly and slightly more than the limit found, by
-/// a straight line; and that there is no growth below and growth above.
+/// The stiffness where growth(k) changes sign, between slightly less and slightly more than the
+/// limit found, by a straight line. Expects no growth below and growth above.
 template <class Growth>
 void expect_turn(double limit, const Growth& growth) {
   constexpr double kAside = 0.05;
@@ -85,7 +85,7 @@ void expect_turn(double limit, const Growth& growth) {
   EXPECT_NEAR(turn, 1, 0.01) << "a limit of " << limit;
 }
 
-/// Seven joints, with and without gears that bend, as masses on springs.
+/// Seven joints, rigid and elastic, as masses on springs.
 TEST(Contact, MassesTurnWhereTheLimitIs) {
   int compared = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {

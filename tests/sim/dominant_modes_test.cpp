@@ -1,5 +1,5 @@
 // The Fourier transform of a simulated release has its peaks at the modes, as high as their shares
-// say: the way in which dominant modes are found from measured motion.
+// predict: so dominant modes are found from measured motion.
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/posture_loop.hpp>

@@ -1,5 +1,5 @@
-// Arms whose gears bend: what two masses on a spring do, and what is kept. The loop that is closed
-// over them is in elastic_prediction_test.cpp.
+// Arms with elastic joints: motion of two masses on a spring, and conserved quantities. The closed
+// loop is in elastic_prediction_test.cpp.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/sim/scenes.hpp>
@@ -124,8 +124,8 @@ TEST(ElasticArm, KeepsItsEnergyUnlessSomethingTurnsItToHeat) {
   }
 }
 
-/// theta - q = g(q) / K, of the link or of the motor where it was told to start; g by the
-/// controller's model.
+/// theta - q = g(q) / K, of the link or of the motor at its given start; g by the controller's
+/// model.
 TEST(ElasticArm, RestsWhereItsGearsCarryTheWeight) {
   const controller::RobotModel model = testing::panda_model();
   for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
@@ -187,7 +187,7 @@ TEST(ElasticArm, MovesAlikeWithAllIntegrators) {
       EXPECT_EQ(plant.step(joints({3, -20, 2, 10, 1, 1, 0.5})), Status::kOk);
     }
     VectorXd state = plant.state().head(28);
-    state.tail(14) /= 1000;  // rad/s, of gears with about so many rad/s
+    state.tail(14) /= 1000;  // rad/s, of gears with about 1000 rad/s
     return state;
   };
   const VectorXd expected = end_of(precise(0.001).integrator);

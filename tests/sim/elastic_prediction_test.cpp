@@ -1,4 +1,4 @@
-// Arms whose gears bend: modes and margin that the analysis of the sampled loop predicts, beside
+// Arms with elastic joints: modes and margin that the analysis of the sampled loop predicts, beside
 // the simulated arm under the real controller. dashpot_stress elastic modes draws hundreds of
 // loops.
 #include <dashpot/tests/support/elastic_prediction.hpp>

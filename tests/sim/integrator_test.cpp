@@ -1,4 +1,4 @@
-// Integrators against what theory says of them.
+// Integrators against theory.
 #include <dashpot/tests/sim/scenes.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 
@@ -178,7 +178,7 @@ TEST(AdaptiveSteps, KeepToTheToleranceAndGrowWithIt) {
   }
 }
 
-/// An oscillator that counts how often it is asked.
+/// An oscillator that counts its evaluations.
 class CountingOscillator : public LinearSystem {
  public:
   CountingOscillator() : LinearSystem(kOne, kZero, kOne) {}

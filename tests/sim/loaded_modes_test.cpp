@@ -1,5 +1,5 @@
 // Arms that hold a load, or touch something elastic: the modes that the controller predicts there
-// against those that a fit finds in the simulated motion after small releases.
+// against modes that a fit finds in the simulated motion after small releases.
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/base/orientation.hpp>
@@ -29,7 +29,7 @@ using Eigen::VectorXd;
 using testing::Random;
 using testing::TwinModels;
 
-/// What the world does: a wrench that is `wrench` at rest, and an environment.
+/// The load of the world: a wrench that is `wrench` at rest, and an environment.
 struct World {
   Load load = Load::kBaseWrench;
   Vector6 wrench = Vector6::Zero();
@@ -269,7 +269,7 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
     loop.friction = twin.friction();
     JointMatrix load = JointMatrix::Zero(n, n);
     if (param.load != Load::kIgnored) load = stiffness_of_load(robot.J, param.load, world.wrench);
-    // What is made of torques that are held from tick to tick acts as the controller does.
+    // Torques that are held from tick to tick act like the controller's.
     const bool held = param.load != Load::kBaseWrench;
     loop.gravity_gradient = twin.gravity_gradient(q0);
     if (!held) {

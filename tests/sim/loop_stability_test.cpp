@@ -88,7 +88,7 @@ TEST(LoopStability, TurnsWhereTheAnalysisSays) {
   EXPECT_EQ(compared, 48);
 }
 
-/// The real controller and the arms at 1 kHz with one tick of delay, and with what else there is.
+/// The real controller and the arms at 1 kHz with one tick of delay, and with other options.
 class ArmStability : public ::testing::TestWithParam<testing::Arm> {};
 INSTANTIATE_TEST_SUITE_P(Arms, ArmStability, ::testing::ValuesIn(testing::arms()),
                          [](const auto& instance) { return std::string(instance.param.file); });

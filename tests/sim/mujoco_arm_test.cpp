@@ -1,5 +1,5 @@
-// Another engine against sim::Arm: the same accelerations, and motions; and what it has of its own,
-// dry friction and stops. Skipped where the build has no MuJoCo.
+// Another engine against sim::Arm: the same accelerations, and motions; and its own dry friction
+// and stops. Skipped if the build has no MuJoCo.
 #include <dashpot/tests/sim/scenes.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/dice.hpp>
@@ -65,7 +65,7 @@ TEST_F(MujocoPlant, HasTheAccelerationsOfTheStandIn) {
     sim::Vector6 wrench;
     wrench << 10, -20, 30, 1, -2, 3;
     world.wrenches = {{0, 1, wrench}};
-    world.wall.emplace();  // in which each second arm is
+    world.wall.emplace();  // which every second arm touches
     const JointVector q = random(robot.dof(), 1), qd = random(robot.dof(), 1);
     world.wall->point = sim::Arm(robot).tip_pose(q).position;
     world.wall->point.z() += dice.uniform(-0.02, 0.02);

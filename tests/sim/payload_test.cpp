@@ -1,4 +1,4 @@
-// An arm that drops what its damping was designed for.
+// An arm that drops the payload for which its damping was designed.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
@@ -14,8 +14,8 @@ using controller::Attachment;
 using controller::JointVector;
 
 /// An iiwa 7 whose drives are a tick late drops at 0.3 s the 3 kg at 0.12 m for which its damping
-/// is designed. Springs and dampers that the wrist alone bears 1.31 times settle; at 0.93 times
-/// they shake it.
+/// is designed. Springs and dampers settle if the wrist alone has a margin of 1.31; at 0.93 they
+/// shake it.
 TEST(PayloadInTheLoop, ShakesAWristThatDropsItWhereTheJudgeSaysSo) {
   const testing::Arm file = testing::all_arms()[4];
   const controller::Payload payload{3, {0, 0, 0.12}, 0.003 * Eigen::Matrix3d::Identity()};

@@ -1,4 +1,4 @@
-// Sensors that fail, and hands that carry a robot.
+// Sensors that fail, and hands that move a robot.
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/sim/scenes.hpp>
 
@@ -14,8 +14,8 @@ using testing::kOne;
 using testing::kZero;
 using testing::run;
 
-/// Returns what a mass shows at tick 5 that moves with 2 m/s from 1 m on, with a fault from tick 3
-/// to 8.
+/// Returns the measurement at tick 5 of a mass that moves with 2 m/s from 1 m on, with a fault from
+/// tick 3 to 8.
 Measurement shown(SensorFault fault, int ticks, bool difference = false) {
   LinearSystem mass(kOne, kZero, kZero);
   PlantOptions options;

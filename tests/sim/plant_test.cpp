@@ -1,4 +1,4 @@
-// The loop as on hardware: what lies between command, motion and measurement.
+// The loop as on hardware: the parts between command, motion and measurement.
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/sim/scenes.hpp>
 #include <dashpot/tests/support/matrices.hpp>

@@ -1,5 +1,5 @@
-// The arms ring down as the controller says: its published modes against those that a fit finds in
-// the simulated motion after small releases.
+// The arms ring down as predicted: the controller's published modes against modes that a fit finds
+// in the simulated motion after small releases.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
@@ -46,11 +46,11 @@ struct ReleasedTwin {
     loop.friction = twin.friction();
     loop.gravity_gradient = twin.gravity_gradient(q0);
   }
-  /// Dampers of the tip that hold a ratio at every tick in place of constant ones.
+  /// Dampers of the tip that keep a ratio at every tick in place of constant ones.
   void hold_ratio() { gains.task_damping_ratio = 0.3; }
 
-  /// Releases with the options of `loop`, fits the motion and compares with what the controller
-  /// published: with its modes as they are, or with those sampled.
+  /// Releases with the options of `loop`, fits the motion and compares with the controller's
+  /// published modes, continuous or sampled.
   void compare(bool sampled, int ticks, int every, Worst& worst) {
     controller::Settings settings = release_settings(twin, gains, loop.period);
     settings.null_projector = projector;

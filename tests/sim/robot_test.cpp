@@ -1,4 +1,4 @@
-// Reading robots: what is merged, lumped and turned, and what bad files are told.
+// Reading robots: merged, lumped and turned links, and the errors of bad files.
 #include <dashpot/sim/dynamics/articulated_body.hpp>
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/sim/scenes.hpp>

@@ -68,7 +68,7 @@ inline sim::Robot pendulum(
                                parameters);
 }
 
-/// Returns what InvalidScene says of what `make` makes.
+/// Returns the InvalidScene message for `make`.
 template <class Make>
 std::string refusal_of(const Make& make) {
   return refusal<sim::InvalidScene>(make);

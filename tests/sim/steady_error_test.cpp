@@ -1,5 +1,5 @@
-// Integral action and friction compensation at the measured velocity, on simulated arms: what is
-// left of a steady error, what a held arm does when it is let go, and where the energy goes.
+// Integral action and friction compensation at the measured velocity, on simulated arms: the
+// remaining steady error, the motion of a held arm after its release, and the energy.
 #include <dashpot/tests/support/released_arm.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
@@ -20,8 +20,8 @@ using testing::TwinModels;
 constexpr double kTime = 0.5;  // of the integral, s
 constexpr double kShare = 0.8;
 
-/// A Panda whose joints have Coulomb friction, as its controller knows, and which carries a mass at
-/// its tip, in kg, as its controller does not know.
+/// A Panda whose joints have Coulomb friction that its controller knows, and which carries a mass
+/// at its tip, in kg, that its controller does not know.
 struct RoughPanda {
   explicit RoughPanda(double coulomb, double untold = 0) {
     const testing::Arm& arm = testing::arms()[0];
@@ -110,7 +110,7 @@ struct Loop {
   sim::Plant plant;
 };
 
-/// Returns what is left of the way of joint 1, rad, once the arm rests at 0.4 rad.
+/// Returns the remaining error of joint 1, rad, once the arm rests at 0.4 rad.
 double miss(const RoughPanda& panda) {
   Loop loop(panda);
   loop.run(0.2);
@@ -127,8 +127,8 @@ TEST(SteadyError, IsSmallerWithEachOfTheTwo) {
   const double without = miss(plain);
   const double compensated = miss(friction);
   const double integrated = miss(integral);
-  // Springs of 60 N m/rad stop at 1 N m. What is left of friction stops them at 0.2 N m, and on the
-  // way from where its compensation fades the reference brakes.
+  // Springs of 60 N m/rad stop at 1 N m. The remaining friction stops them at 0.2 N m; from where
+  // its compensation fades, the reference brakes.
   const double fading = 0.05 * 0.05 / (2 * 0.5 * plain.settings.motion.acceleration[0]);
   std::printf(
       "1 N m on 60 N m/rad: misses by %.2e rad; with friction compensated %.2e, integral %.2e\n",
@@ -190,14 +190,14 @@ TEST(HeldArm, IsNotThrownWhenLetGo) {
   std::printf(
       "let go at -0.05 rad with 3 N m stored: swings to %.3f rad with %.2f rad/s, rests at %.1e\n",
       farthest, fastest, loop.plant.position()[0] - panda.q0[0]);
-  EXPECT_LT(farthest, 3.0 / 60);  // what the bound deflects the spring by
+  EXPECT_LT(farthest, 3.0 / 60);  // deflection of the spring by the bound
   EXPECT_GT(farthest, 0.1 * 3.0 / 60);
   EXPECT_LT((loop.plant.position() - panda.q0).cwiseAbs().maxCoeff(), 5e-4);
   EXPECT_LT(std::abs(loop.controller.snapshot().integral_torque[0]), 0.01);
   EXPECT_EQ(loop.worst, controller::Status::kOk) << to_text(loop.worst);
 }
 
-/// The torque that compensates friction is what two controllers differ by.
+/// The torque that compensates friction is the difference of two controllers.
 TEST(FrictionCompensation, GivesLessThanFrictionTakes) {
   DASHPOT_SKIP_IF_QUICK();
   struct Sensors {
