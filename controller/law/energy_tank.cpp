@@ -89,14 +89,17 @@ bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight
     weakened_.tool.stiffness *= share_;
     weakened_.null_stiffness *= share_;
   }
-  JointVector further = difference(asked.torque, torque_against(law));
+  const JointVector against = torque_against(law);
+  JointVector further = difference(asked.torque, against);
   add(pull, further, -1);
   add(weight, further, -1);
   double fed = 1;
   if (product(further, law.qd) > 0) fed = std::min(1.0, (there - committed_) / (kSoft * store_));
   add(pull, asked.torque, share_ - 1);
   add(further, asked.torque, fed - 1);
-  return share_ < 1 || fed < 1;
+  const double kept = std::clamp(level_ / (kReserve * store_), 0.0, 1.0);
+  add(against, asked.torque, kept - 1);
+  return share_ < 1 || fed < 1 || kept < 1;
 }
 
 void EnergyTank::apply(const JointVector& torque) noexcept {
