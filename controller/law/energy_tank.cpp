@@ -8,6 +8,7 @@ namespace dashpot::controller {
 
 EnergyTank::EnergyTank(const RobotModel& model, const Settings& settings)
     : store_(settings.energy.from == Energy::From::kTank ? settings.energy.store : 0),
+      period_(settings.period),
       weakened_(model.dof()),
       delay_(static_cast<std::size_t>(settings.analysis.sampled.delay)),
       viscous_(model.joint_values(&Joint::viscous_friction)),
@@ -60,7 +61,7 @@ JointVector torque_against(const ImpedanceLaw::Input& law) noexcept {
 
 bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight,
                        LawTorque& asked) noexcept {
-  constexpr double kReserve = 0.01, kSoft = 0.1;  // of the store
+  constexpr double kReserve = 0.01;  // of the store
   const Impedance& impedance = law.impedance;
   JointVector pull = JointVector::Zero(law.q.size());
   double energy = 0;
@@ -75,12 +76,13 @@ bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight
     if (asked.posture_error.size() == pull.size()) {
       add(law.null_space.spring(impedance.null_stiffness, asked.posture_error), pull);
       for (Eigen::Index i = 0; i < pull.size(); ++i) {
-        energy += 0.5 * impedance.null_stiffness[i] * asked.posture_error[i] * asked.posture_error[i];
+        energy +=
+            0.5 * impedance.null_stiffness[i] * asked.posture_error[i] * asked.posture_error[i];
       }
     }
   }
   const double there = std::max(0.0, level_ - kReserve * store_);
-  share_ = energy > there ? there / energy : 1;
+  share_ = std::min(energy > there ? there / energy : 1, affordable(product(pull, law.qd), there));
   committed_ = share_ * energy;
   if (share_ < 1) {
     weakened_ = impedance;
@@ -89,17 +91,18 @@ bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight
     weakened_.tool.stiffness *= share_;
     weakened_.null_stiffness *= share_;
   }
-  const JointVector against = torque_against(law);
-  JointVector further = difference(asked.torque, against);
+  JointVector further = difference(asked.torque, torque_against(law));
   add(pull, further, -1);
   add(weight, further, -1);
-  double fed = 1;
-  if (product(further, law.qd) > 0) fed = std::min(1.0, (there - committed_) / (kSoft * store_));
+  const double fed = affordable(product(further, law.qd), there - committed_);
   add(pull, asked.torque, share_ - 1);
   add(further, asked.torque, fed - 1);
-  const double kept = std::clamp(level_ / (kReserve * store_), 0.0, 1.0);
-  add(against, asked.torque, kept - 1);
-  return share_ < 1 || fed < 1 || kept < 1;
+  return share_ < 1 || fed < 1;
+}
+
+double EnergyTank::affordable(double power, double energy) const noexcept {
+  const double spent = 2 * (static_cast<double>(delay_) + 1) * period_ * power;
+  return spent > energy ? std::max(0.0, energy / spent) : 1;
 }
 
 void EnergyTank::apply(const JointVector& torque) noexcept {

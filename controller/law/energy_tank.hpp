@@ -15,8 +15,8 @@ namespace dashpot::controller {
 ///     E = 1/2 (e_q' K_q e_q + e' K_C e + e_0' K_0 e_0).
 /// - Springs act with the share s = min(1, (S - reserve) / E) of their torque: they cannot release
 ///   more than there is. Gains that grow and references that move away so wait for energy.
-/// - Feed-forward that adds energy, also of dampers between the arm and references that move,
-///   shrinks as S - reserve - s E falls below a tenth of the store.
+/// - Feed-forward, and what dampers add because references move, shrinks such that its power for
+///   twice the delay and a tick costs at most S - reserve - s E; the power of springs likewise.
 /// - What dampers would do if no reference moved acts in full, and what they dissipate returns to
 ///   S, which is at most store + s E.
 /// Viscous friction of the model counts with b dq^2 / T, which it dissipates at least, and Coulomb
@@ -49,7 +49,12 @@ class EnergyTank {
  private:
   static constexpr std::size_t kMostDelay = 20;  // ticks, as analysis.sampled.delay
 
+  /// Returns the share of a power, W, with which the torques under way spend at most `energy`, J,
+  /// even if the joints get twice as fast.
+  double affordable(double power, double energy) const noexcept;
+
   double store_;  ///< J; 0: there is no tank
+  double period_;
   double level_ = 0, committed_ = 0, share_ = 1;
   Impedance weakened_;
   std::size_t delay_, applied_ = 0;  ///< ticks; torques that were put out

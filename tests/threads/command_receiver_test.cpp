@@ -211,7 +211,12 @@ TEST(CommandReceiver, HearsTheOneThatCommandsThroughAFloodOfOthers) {
     };
   });
   int came_through = 0;
-  for (int i = 0; i < 50; ++i) {
+  const auto flooded = [&] {
+    constexpr int kFlood = 100;
+    const CommandTally now = receiver.tally();
+    return now.count(Verdict::kOtherSender) > kFlood && now.count(Verdict::kMalformed) > kFlood;
+  };
+  for (int i = 0; i < 50 || !flooded(); ++i) {
     const std::int64_t sequence = sender.send_good();
     for (int tick = 0; tick < 20; ++tick) {
       if (receiver.fetch()) {
@@ -226,8 +231,6 @@ TEST(CommandReceiver, HearsTheOneThatCommandsThroughAFloodOfOthers) {
   EXPECT_GT(came_through, 0);
   const CommandTally tally = receiver.tally();
   EXPECT_EQ(tally.commander, kSender);
-  EXPECT_GT(tally.count(Verdict::kOtherSender), 100);
-  EXPECT_GT(tally.count(Verdict::kMalformed), 100);
   EXPECT_EQ(tally.rejected(),
             tally.count(Verdict::kOtherSender) + tally.count(Verdict::kMalformed));
 }
