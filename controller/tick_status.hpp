@@ -26,7 +26,7 @@ namespace dashpot::controller {
 enum class Status : std::uint8_t {
   kOk,
   // The torque is the wanted one as far as possible:
-  kTorqueLimited,     ///< a limit of torque, torque rate, power or speed is at work
+  kTorqueLimited,     ///< a limit of torque, torque rate, power, speed or energy is at work
   kNearJointLimit,    ///< the brake keeps a joint from going beyond a position limit
   kLittleMargin,      ///< springs too stiff for the sampled loop, or a damping ratio too small for
                       ///< them: no share of the ratio keeps Limits::gain_margin at this posture

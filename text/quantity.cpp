@@ -28,7 +28,7 @@ struct NamedUnit {
   Unit unit;
 };
 
-constexpr std::array<NamedUnit, 19> kUnits = {{
+constexpr std::array<NamedUnit, 20> kUnits = {{
     //         factor       kg m  s  rad
     {"g", {1e-3, {1, 0, 0, 0}}},
     {"kg", {1, {1, 0, 0, 0}}},
@@ -49,6 +49,7 @@ constexpr std::array<NamedUnit, 19> kUnits = {{
     {"Nm", {1, {1, 2, -2, 0}}},
     {"Nms", {1, {1, 2, -1, 0}}},
     {"W", {1, {1, 2, -3, 0}}},
+    {"J", {1, {1, 2, -2, 0}}},
 }};
 
 constexpr std::string_view kSpaces = " \t";

@@ -7,7 +7,7 @@ const char* to_text(Status status) noexcept {
     case Status::kOk:
       return "ok";
     case Status::kTorqueLimited:
-      return "torque, torque rate, power or speed limited";
+      return "torque, torque rate, power, speed or energy limited";
     case Status::kNearJointLimit:
       return "near a joint's position limit";
     case Status::kLittleMargin:

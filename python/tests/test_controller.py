@@ -75,7 +75,7 @@ def test_statuses_are_those_of_the_header():
     statuses = header[:header.index("NULL_ARGUMENT = ")]
     listed = {name: int(code) for name, code in re.findall(r"  DASHPOT_(\w+) = (\d+),", statuses)}
     assert {status.name: int(status) for status in dashpot.Status} == listed
-    assert dashpot.Status.TORQUE_LIMITED.text == "torque, torque rate, power or speed limited"
+    assert dashpot.Status.TORQUE_LIMITED.text == "torque, torque rate, power, speed or energy limited"
 
 
 def test_a_dict_is_as_good_as_a_file(config, panda):

@@ -127,7 +127,7 @@ TEST(RegionOfAnArm, SaysWhatBindsWhereTheAnswerMissesWhatWasAsked) {
   const Outcome too_much =
       ask_panda("design", kSprings, joined(wide, {"--viscous-friction", "300"}));
   EXPECT_EQ(too_much.status, 1);
-  EXPECT_THAT(too_much.err, HasSubstr("damps more than --largest-ratio allows"));
+  EXPECT_THAT(too_much.err, HasSubstr("the existing damping exceeds --largest-ratio"));
 }
 
 TEST(SingularPosture, NamesTheDirectionsAndSuggestsNothing) {

@@ -34,7 +34,7 @@ TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
     EXPECT_NE(mode["kind"], "unstable");
   }
   for (const auto& [status, ticks] : result["status"].items()) {
-    EXPECT_THAT((std::vector<std::string>{"ok", "torque, torque rate, power or speed limited"}),
+    EXPECT_THAT((std::vector<std::string>{"ok", "torque, torque rate, power, speed or energy limited"}),
                 ::testing::Contains(status));
     EXPECT_GT(ticks.get<int>(), 0);
   }

@@ -114,7 +114,7 @@ TEST(Drives, AreReadFromAFile) {
     }
     return std::string();
   };
-  EXPECT_THAT(refusal("reflected_inertia: [1, 2]\n"), HasSubstr("have 2 joints, the arm has 7"));
+  EXPECT_THAT(refusal("reflected_inertia: [1, 2]\n"), HasSubstr("has 2 joints, the arm has 7"));
   EXPECT_THAT(refusal("reflected_inertia: [1, -2]\n"), HasSubstr("bad.yaml: reflected_inertia"));
   EXPECT_THAT(refusal("coulomb_friction: [1]\n"), HasSubstr("reflected_inertia: missing"));
   EXPECT_THAT(refusal("rotors: [1]\n"), HasSubstr("rotors"));

@@ -276,7 +276,7 @@ TEST(UrdfForms, AreDoubtedWhereWhatIsToldBesideCannotBeRight) {
     EXPECT_THAT(warnings(change), ::testing::Contains(HasSubstr(said)));
   }
   EXPECT_THAT(warnings([](O& o) { o.reflected_inertia.setConstant(7, 1e-5); }),
-              ::testing::Contains(HasSubstr("multiplied by the gear ratio's square?")));
+              ::testing::Contains(HasSubstr("multiplied by the square of the gear ratio?")));
   EXPECT_THAT(warnings([](O& o) {
                 o.gravity = {0, 0, -1};
               }),
