@@ -22,8 +22,9 @@ struct Touch {
 /// The stiffness k of a touch at which a sampled loop loses its stability.
 struct ContactLimit {
   /// N/m: the first boundary above 0 to six digits, found in steps of at most a factor of 1.6 and
-  /// finer ones where the least ratio has a minimum; 0 if the loop is unstable before it touches,
-  /// infinite if there is no boundary up to Touch::most.
+  /// finer ones where the least ratio has a minimum or the touch turns by a multiple of pi in a
+  /// tick; 0 if the loop is unstable before it touches, infinite if there is no boundary up to
+  /// Touch::most.
   double stiffness = 0;
   /// The loop is stable at `lower` and unstable at `upper`, N/m: the eigenvalues outside the unit
   /// circle were counted there by the argument principle, in steps that can miss none. Equal to

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <array>
+#include <numbers>
 
 namespace dashpot::analysis {
 namespace {
@@ -36,6 +37,10 @@ class TouchedLoop {
   /// Returns the stiffness with which the touch alone makes the arm move at `omega` rad/s.
   double stiffness_at(double omega) const {
     return omega * omega * period_ * period_ / a_.squaredNorm();
+  }
+  /// Returns by how many half turns the touch alone makes the arm turn in a tick.
+  double half_turns(double stiffness) const {
+    return std::floor(std::sqrt(stiffness / stiffness_at(1 / period_)) / std::numbers::pi);
   }
   double period() const { return period_; }
   /// Whether the state is too large for its eigenvalues.
@@ -135,6 +140,42 @@ Trial look_between(const TouchedLoop& loop, double low, double high) {
   return a.excess < 0 ? b : a;
 }
 
+/// Looks for an unstable stiffness near which the touch alone would turn by `turn`, a multiple of
+/// pi, in a tick: there the two eigenvalues of its motion meet on the real axis, and one of them
+/// may leave the circle, in a band much narrower than a step. Returns a stable trial below it and
+/// the last trial, unstable or not.
+std::array<Trial, 2> look_at_axis(const TouchedLoop& loop, double turn) {
+  constexpr double kAround = 0.3;  // rad
+  constexpr int kLooks = 6;
+  constexpr double kMet = 1e-7;  // rad, where the eigenvalues are one
+  const double unit = loop.stiffness_at(1 / loop.period());
+  const auto at = [&](double angle) { return loop.at(angle * angle * unit); };
+  const auto distance = [&](const Trial& trial) {
+    Eigen::Index nearest = 0;
+    const Complex there = std::polar(1.0, std::sqrt(trial.factor / unit));
+    (trial.values.array() - there).abs2().minCoeff(&nearest);
+    return std::abs(std::arg(std::cos(turn) * trial.values[nearest]));
+  };
+  Trial low = at(turn - kAround);
+  if (low.excess >= 0 || low.values.size() == 0) return {low, low};
+  Trial last = low;
+  double begin = turn - kAround, end = turn + kAround;
+  double before = distance(low), after = distance(at(end));
+  for (int i = 0; i < kLooks; ++i) {
+    const double angle = begin + (end - begin) * before / std::max(before + after, kEps);
+    last = at(angle);
+    const double now = distance(last);
+    if (last.excess >= 0 || now < kMet) break;
+    // the motion turns about as the touch alone would
+    if (std::abs(now - before + (angle - begin)) < std::abs(now - after + (end - angle))) {
+      begin = angle, before = now;
+    } else {
+      end = angle, after = now;
+    }
+  }
+  return {low, last};
+}
+
 /// Returns the boundary between two trials, or another one that finer steps find below it.
 double first_boundary(const TouchedLoop& loop, Trial inside, const Trial& outside) {
   constexpr int kSteps = 5;
@@ -183,6 +224,14 @@ void find_limit(const TouchedLoop& loop, const Touch& touch, ContactLimit& resul
           here = found;
           if (here.factor < before[0].factor) before[0] = before[1];
         }
+      }
+    }
+    const double turns = loop.half_turns(here.factor);
+    if (turns > loop.half_turns(before[0].factor) && here.values.size() > 0) {
+      const auto [low, found] = look_at_axis(loop, std::numbers::pi * turns);
+      if (low.excess < 0 && !(found.excess < 0)) {
+        before[0] = low;
+        here = found;
       }
     }
     if (!(here.excess < 0)) {

@@ -271,6 +271,34 @@ TEST(Contact, BracketsHoldAtFiftyDigits) {
 #endif
 
 /// With a difference of positions: D >= K T / 2 + |B| (Colgate and Schenkel 1997).
+/// Where the touch turns by a multiple of pi in a tick, a loop may be unstable in a narrow band.
+TEST(Contact, MissesNoNarrowBand) {
+  constexpr int kLoops = 1000;
+  constexpr double kStep = 1.004;
+  int limits = 0;
+  for (int seed = 5001; seed <= 5000 + kLoops; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed));
+    const int n = random.integer(1, 4);
+    const System<> system = testing::random_system(random, n);
+    SampledLoop loop = testing::random_loop(random);
+    loop.friction = random.integer(0, 1) * 0.1 * system.damping;
+    const Touch touch = touch_along(random.vector(n), 1e8);
+    if (loop.delay > 0) continue;  // whose limits come before half a turn
+    const Spectrum<> spectrum = analyze(system);
+    const double found = contact_limit(system, spectrum, loop, touch, false).stiffness;
+    limits += found > 0 ? 1 : 0;
+    std::vector<double> below;
+    for (double k = 1e3; k < std::min(found, touch.most) * (1 - 1e-4); k *= kStep) {
+      below.push_back(k);
+    }
+    for (const ContactPoint& point : contact_curve(system, spectrum, loop, touch, below)) {
+      ASSERT_GT(point.damping_ratio, -1e-9) << point.stiffness << " of " << found;
+    }
+  }
+  std::printf("%d limits\n", limits);
+  EXPECT_GT(limits, kLoops / 10);
+}
+
 TEST(PortPassivity, OfOneJointIsThatOfColgateAndSchenkel) {
   Random random(620);
   for (int i = 0; i < 30; ++i) {
