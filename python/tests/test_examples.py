@@ -40,6 +40,22 @@ def test_release():
     assert text.count(" 0.7  ") == 6
 
 
+@needs("nbclient")
+@needs("ipykernel")
+def test_first_hour(tmp_path):
+    """The notebook runs from the package alone, in an empty folder."""
+    import nbclient
+    import nbformat
+
+    notebook = nbformat.read(ROOT / "python/examples/first_hour.ipynb", as_version=4)
+    nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": tmp_path}}).execute()
+    text = "".join(output.get("text", "") for cell in notebook.cells
+                   for output in cell.get("outputs", []))
+    critical, designed = (float(one) for one in re.findall(r"swings ([\d.]+) mm beyond", text))
+    assert designed < 0.5 * critical
+    assert text.count("rad/s") == 2
+
+
 @needs("mujoco")
 def test_mujoco_loop():
     text = run("mujoco_loop.py", CONFIG, PANDA)
