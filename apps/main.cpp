@@ -154,7 +154,9 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
     const auto chosen = program.get_subcommands();
-    const bool unknown = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+    // The value of an unknown option is taken for a CONFIG, which excludes others.
+    const bool unknown = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
+                         error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExcludesError);
     const std::string meant =
         unknown ? meant_option(chosen.empty() ? program : *chosen.front(), argc, argv) : "";
     return report(name() + ": " + error.what() + meant + " (" + name() + " --help)", kBadInput);

@@ -179,7 +179,7 @@ class Audit {
   SampledArm arm_;
   Impedance impedance_;               ///< in 1/s^2 and 1/s with inertia_blocks
   int springs_ = 0;                   ///< modes where no posture is singular
-  std::optional<Settings> designed_;  ///< of the controller that designs damping for ratios
+  std::optional<Settings> designed_;  ///< that design damping for ratios, or AuditOptions::settings
 };
 
 /// Summarizes postures by their `numbers`; posture(i) returns the i-th posture. `numbers` only

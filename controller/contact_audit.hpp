@@ -27,8 +27,10 @@ struct ContactAt {
 /// The largest force of the joints in a direction, beside the weight of the arm.
 struct HeldForce {
   Eigen::Vector3d direction;  ///< in which the tip presses, of length 1, in the base's axes
-  double force = 0;           ///< at which the first joint reaches its effort limit, N; or infinity
-  int joint = -1;             ///< the joint at its limit, from 0; -1: none
+  /// At which the first joint reaches its effort limit, N; infinite: no joint bears it, NaN: the
+  /// limits of all that do are unknown.
+  double force = 0;
+  int joint = -1;  ///< the joint at its limit, from 0; -1: none
   /// How far the springs are pressed in with that force, m, beyond which they are springs no more;
   /// infinite where no spring acts.
   double deflection = 0;
@@ -42,12 +44,16 @@ struct ContactAudit {
   /// with a tick less of delay; NaN where there is no delay.
   double with_half_stiffness = 0, with_more_damping = 0, with_less_delay = 0;
   analysis::PortPassivity passivity;
-  JointVector weight, effort;  ///< torque against gravity and its limit, n, N m; limit 0: not known
+  JointVector weight, effort;     ///< against gravity, and its limit, n, N m (N); infinite: unknown
   std::vector<HeldForce> forces;  ///< along the touch, against it, and along all axes of the base
 };
 
+/// Returns 13 directions of length 1, spread over the half sphere: the axes, and the diagonals of
+/// faces and space.
+std::vector<Eigen::Vector3d> contact_directions();
+
 /// Returns the limit at q (n, rad) without proved bounds. Without a direction in the options, it is
-/// the least of 13 directions spread over the half sphere. Throws like Audit::numbers, and
+/// the least of contact_directions. Throws like Audit::numbers, and
 /// std::invalid_argument without a period, for what ContactOptions does not allow, and for a
 /// direction in which the tip cannot move.
 ContactAt find_contact(const Audit& audit, const JointVector& q, const ContactOptions& options);

@@ -117,7 +117,8 @@ void add_audit(CLI::App& program) {
   command->footer(std::string(kAuditHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
   command->callback([options] {
     check_outputs({{"--csv", options->csv}, {"--plot", options->plot}},
-                  {{"--urdf", options->arm.urdf},
+                  {{"CONFIG", options->config},
+                   {"--urdf", options->arm.urdf},
                    {"--gains", options->gains},
                    {"--postures", options->postures.file},
                    {"--log", options->postures.log}});

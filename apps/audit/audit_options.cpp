@@ -6,7 +6,9 @@
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/report/text_table.hpp>
+#include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/controller/config.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/yaml_document.hpp>
 
 #include <CLI/CLI.hpp>
@@ -140,7 +142,11 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
   gains.joint_damping = factor_damping("--damping-factor", *factor, gains.joint_stiffness);
 }
 
-void check(const AuditCommand& command) {
+/// Refuses gains that are missing, or said twice.
+void check_gains(const AuditCommand& command) {
+  if (command.arm.urdf.empty() || command.arm.base.empty() || command.arm.tip.empty()) {
+    throw InputError("--urdf", "give a CONFIG, or --urdf with --base and --tip");
+  }
   const bool joint = !command.joint_stiffness.empty();
   const int sources = (command.preset.empty() ? 0 : 1) + (command.gains.empty() ? 0 : 1) +
                       (command.stiffness.empty() ? 0 : 1) + (joint ? 1 : 0);
@@ -171,6 +177,10 @@ void check(const AuditCommand& command) {
   if (!command.mode.empty() && command.gains.empty()) {
     throw InputError("--mode", "goes with --gains");
   }
+}
+
+void check(const AuditCommand& command) {
+  if (command.config.empty()) check_gains(command);
   command.postures.check();
   if (command.timing.period == 0 && given(command.timing)) {
     throw InputError(
@@ -185,12 +195,25 @@ void check(const AuditCommand& command) {
   if (!command.plot.empty()) check_plot_name(command.plot);
 }
 
-}  // namespace
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-AuditTask read_task(const AuditCommand& command) {
-  check(command);
-  ArmOptions arm = command.arm;
-  AuditTask task{read_model(arm), {}, std::numeric_limits<double>::quiet_NaN(), 0, {}, {}};
+AuditTask configured_task(const AuditCommand& command) {
+  controller::Config config = controller::load_config(command.config);
+  warn_of(config);
+  AuditTask task{std::move(config.model), controller::audit_options(config.settings), kUnknown, 0};
+  task.friction = controller::friction_text(task.model);
+  task.drives = config.robot.options.drives;
+  const controller::Gains& gains = task.options.gains;
+  const double ratio =
+      task.options.mode == Mode::kJoint ? gains.joint_damping_ratio : gains.task_damping_ratio;
+  if (ratio > 0) task.intended_ratio = ratio;
+  task.q = posture_of(command.config, command.arm.posture, task.model);
+  return task;
+}
+
+AuditTask stated_task(const AuditCommand& command) {
+  const ArmOptions& arm = command.arm;
+  AuditTask task{read_model(arm), {}, kUnknown, 0};
   task.friction = friction_note(arm, task.model);
   task.drives = arm.drives;
   AuditOptions& audit = task.options;
@@ -202,26 +225,43 @@ AuditTask read_task(const AuditCommand& command) {
                 ": it feeds energy in");
   }
   static_cast<controller::LoopTiming&>(audit) = command.timing;
-  if (command.no_margin) audit.period = 0;
   audit.margin = command.margin;
+  task.q = arm.posture.read(task.model);
+  return task;
+}
+
+}  // namespace
+
+std::string AuditTask::rotors_hint() const {
+  return options.settings
+             ? controller::rotors_hint(model, "robot.reflected_inertia", "robot.drives:", "\n  ")
+             : controller::rotors_hint(model, "--reflected-inertia", "--drives", "\n  ");
+}
+
+AuditTask read_task(const AuditCommand& command) {
+  check(command);
+  AuditTask task = command.config.empty() ? stated_task(command) : configured_task(command);
+  if (command.no_margin) task.options.period = 0;
   const double intended = std::isnan(task.intended_ratio) ? 0.7 : task.intended_ratio;
   task.wanted_ratio = command.damping_ratio.value_or(intended);
-  task.q = arm.posture.read(task.model);
-  task.postures = command.postures.listed(arm.posture, task.model);
+  task.postures = command.postures.listed(command.arm.posture, task.model);
   if (command.postures.spread) {
     command.postures.range(task.model, task.q, task.options.lower, task.options.upper);
   }
   return task;
 }
 
-void add_stated_options(CLI::App& command, AuditCommand& options) {
+CLI::Option* add_stated_options(CLI::App& command, AuditCommand& options) {
+  CLI::Option* config =
+      command.add_option("config", options.config, "Configuration of the controller, or a scene")
+          ->option_text("[CONFIG]");
   const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
     return command.add_option(name, text, help)->option_text(words);
   };
   ArmOptions& arm = options.arm;
-  add("--urdf", arm.urdf, "Robot description", "FILE")->required();
-  add("--base", arm.base, "Link that stands still", "LINK")->required();
-  add("--tip", arm.tip, "Link at the end of the chain", "LINK")->required();
+  add("--urdf", arm.urdf, "Robot description instead", "FILE");
+  add("--base", arm.base, "Link that stands still", "LINK");
+  add("--tip", arm.tip, "Link at the end of the chain", "LINK");
   add("--preset", options.preset, "Default gains of a public controller", "NAME")
       ->check(CLI::IsMember(preset_names()));
   add("--stiffness,--task-stiffness", options.stiffness, "Diagonal, N/m and N m/rad",
@@ -249,22 +289,30 @@ void add_stated_options(CLI::App& command, AuditCommand& options) {
       ->check(CLI::IsMember({"dynamic", "kinematic"}));
   add_model_options(command, arm);
   add_loop_options(command, options.timing);
+  for (CLI::Option* option : command.get_options([&](const CLI::Option* one) {
+         return one != config && one != command.get_help_ptr();
+       })) {
+    option->excludes(config);
+  }
   arm.posture.add(command);
   options.postures.add(command);
   command.add_option("--jobs,--threads", options.jobs, "Threads; 0: one for each processor")
       ->check(CLI::Range(0, 1024))
       ->option_text("N (0)");
   command.add_flag("--json", options.json, "Print JSON instead of tables");
+  return config;
 }
 
 void add_audit_options(CLI::App& command, AuditCommand& options) {
-  add_stated_options(command, options);
+  CLI::Option* config = add_stated_options(command, options);
   command
       .add_option("--period", options.timing.period,
                   "Of the control loop: computes the gain margin")
+      ->excludes(config)
       ->transform(control_period())
       ->option_text("S");
   command.add_option("--margin", options.margin, "Gain margin that is asked for")
+      ->excludes(config)
       ->transform(quantity("", 1, 1e6, "a factor of at least 1"))
       ->option_text("G (2)");
   command.add_flag("--no-margin", options.no_margin, "Leave the gain margin out");

@@ -84,8 +84,7 @@ std::string rotors_table(const AuditTask& task, const controller::PostureAudit& 
             ", the fastest pole " + format_number(rotors.numbers.fastest_pole, 6) + " 1/s" +
             (loop ? ", the gain margin " + margin_text(rotors.numbers.gain_margin) : "") + ".\n";
   }
-  return text + "  " + controller::rotors_hint(model, "--reflected-inertia", "--drives", "\n  ") +
-         "\n";
+  return text + "  " + task.rotors_hint() + "\n";
 }
 
 /// Returns what a gain margin means. A loop is not called unstable if its rotors are unknown.

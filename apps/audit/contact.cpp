@@ -11,7 +11,6 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 #include <stdexcept>
 
@@ -28,17 +27,6 @@ struct ContactCommand {
   double asked = 0;
   std::string direction, plot;
 };
-
-/// Reads "x", "-z" or "0,0.6,0.8".
-Eigen::Vector3d read_direction(const std::string& text) {
-  static const std::map<std::string, Eigen::Vector3d> axes = {{"x", {1, 0, 0}}, {"-x", {-1, 0, 0}},
-                                                              {"y", {0, 1, 0}}, {"-y", {0, -1, 0}},
-                                                              {"z", {0, 0, 1}}, {"-z", {0, 0, -1}}};
-  if (const auto axis = axes.find(text); axis != axes.end()) return axis->second;
-  const Eigen::Vector3d given = parse_quantities("--direction", text, {"", "", ""});
-  if (given.isZero(0)) throw InputError("--direction", "is zero: a touch needs a direction");
-  return given.normalized();
-}
 
 /// Ten stiffnesses a decade, and zero.
 std::vector<double> curve_stiffness() {
@@ -137,8 +125,9 @@ void add_contact(CLI::App& program) {
   constexpr double kMost = std::numeric_limits<double>::max();
   audit.timing.period = 1e-3;
   audit.arm.posture.has_to_hold = true;
-  add_stated_options(*command, audit);
+  CLI::Option* config = add_stated_options(*command, audit);
   command->add_option("--period", audit.timing.period, "Of the control loop")
+      ->excludes(config)
       ->transform(control_period())
       ->option_text("S (1 ms)");
   command->add_option("--direction", options->direction, "Of the touch, in the base's axes")
@@ -159,7 +148,8 @@ void add_contact(CLI::App& program) {
       ->option_text("FILE.svg|FILE.png");
   command->footer(std::string(kContactHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
   command->callback([options] {
-    check_outputs({{"--plot", options->plot}}, {{"--urdf", options->audit.arm.urdf},
+    check_outputs({{"--plot", options->plot}}, {{"CONFIG", options->audit.config},
+                                                {"--urdf", options->audit.arm.urdf},
                                                 {"--gains", options->audit.gains},
                                                 {"--postures", options->audit.postures.file},
                                                 {"--log", options->audit.postures.log}});

@@ -3,6 +3,7 @@
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/apps/report/text_table.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 
@@ -96,14 +97,17 @@ std::string verdict(const AuditTask& task, const ContactReport& report) {
   return text + (report.posture.passivity.passive ? "; passive." : "; not passive.");
 }
 
-std::string passivity_text(const analysis::PortPassivity& found) {
+std::string passivity_text(const controller::RobotModel& model,
+                           const analysis::PortPassivity& found) {
   if (found.passive)
     return "  Passive: stable in contact with everything that is passive itself.\n";
   std::string text = "  Not passive";
   if (found.missing_friction > 0) {
+    const text::Units units = controller::joint_units(model, "N m s/rad", "N s/m");
+    const bool same = std::count(units.begin(), units.end(), units[0]) == std::ssize(units);
     text += " from " + format_number(found.from, 3) + " to " + format_number(found.to, 4) +
-            " rad/s: each joint would need " + format_number(found.missing_friction, 3) +
-            " N m s/rad more of friction of its own";
+            " rad/s: each joint would need " + format_number(found.missing_friction, 3) + " " +
+            (same ? units[0] : "N m s/rad (N s/m)") + " more of friction of its own";
   } else {
     text += found.instants ? ", though no motion below the Nyquist frequency gets energy"
                            : ": the springs do not pull back from everywhere";
@@ -131,7 +135,7 @@ std::string touch_table(const AuditTask& task, const ContactReport& report) {
   if (!std::isnan(found.with_less_delay)) {
     text += ", with a tick less of delay " + stiffness_text(found.with_less_delay);
   }
-  text += " N/m.\n" + passivity_text(found.passivity) +
+  text += " N/m.\n" + passivity_text(task.model, found.passivity) +
           assumes_text(loop_assumptions(task.options, &task.model));
   if (const std::string missing = controller::missing_rotors_text(task.model); !missing.empty()) {
     text += "  Rotors unknown: " + missing + ". The limit is computed for " +
@@ -141,8 +145,7 @@ std::string touch_table(const AuditTask& task, const ContactReport& report) {
               std::string(controller::unknown_rotors(task.model).published->name) + " it is " +
               stiffness_text(report.limit_with_rotors) + " N/m.\n";
     }
-    text += "  " + controller::rotors_hint(task.model, "--reflected-inertia", "--drives", "\n  ") +
-            "\n";
+    text += "  " + task.rotors_hint() + "\n";
   }
   TextTable table({{Align::kPoint, {"touch", "N/m"}},
                    {Align::kPoint, {"least", "ratio"}},
@@ -163,16 +166,19 @@ std::string hold_table(const AuditTask& task, const ContactReport& report) {
     return text::printable(task.model.joints()[static_cast<std::size_t>(joint)].name);
   };
   TextTable joints({{Align::kLeft, {"", "joint"}},
-                    {Align::kPoint, {"weight", "N m"}},
-                    {Align::kPoint, {"limit", "N m"}},
+                    {Align::kPoint, {"", "weight"}},
+                    {Align::kPoint, {"", "limit"}},
+                    {Align::kLeft, {"", ""}},
                     {Align::kPoint, {"share", "%"}}});
+  const text::Units units = controller::joint_units(task.model, "N m", "N");
   const std::vector<std::string> weights =
       format_column({found.weight.begin(), found.weight.end()}, 4);
   for (int i = 0; i < found.weight.size(); ++i) {
-    const bool limited = found.effort[i] > 0;
+    const bool limited = std::isfinite(found.effort[i]);
     joints.add_row(
         {name(i), weights[static_cast<std::size_t>(i)],
-         limited ? format_number(found.effort[i], 4) : "-",
+         limited ? format_number(found.effort[i], 4) : "unknown",
+         units[static_cast<std::size_t>(i)],
          limited ? format_number(std::round(100 * std::abs(found.weight[i]) / found.effort[i]), 2)
                  : "-"});
   }
@@ -182,6 +188,7 @@ std::string hold_table(const AuditTask& task, const ContactReport& report) {
                     {Align::kLeft, {"", "at its limit"}}});
   for (const HeldForce& one : found.forces) {
     const auto number = [](double value, double unit) {
+      if (std::isnan(value)) return std::string("unknown");
       return std::isinf(value) ? "-" : format_number(unit * value, 4);
     };
     forces.add_row({direction_text(one.direction), number(one.force, 1),
@@ -296,10 +303,11 @@ void draw_contact(const std::string& path, const AuditTask& task, const ContactR
   const double limit = report.posture.touch.limit.stiffness;
   if (limit > 0 && std::isfinite(limit)) {
     out << "set arrow 1 from " << limit << ", graph 0 to " << limit
-        << ", graph 1 nohead lw 2 lc rgb '#d62728'\n";
+        << ", graph 1 nohead lw 2 lc rgb '#d62728'\nset label 1 ' limit " << format_number(limit, 3)
+        << " N/m' at " << limit << ", graph 0.93 textcolor rgb '#d62728'\n";
   }
   out << "plot $curve using 1:2 with lines lw 2 lc rgb '#1f77b4' notitle, 0 lc rgb '#777777' "
-         "notitle\nset ylabel 'its frequency, rad/s'\nset logscale y\n"
+         "notitle\nunset label 1\nset ylabel 'its frequency, rad/s'\nset logscale y\n"
       << "plot $curve using 1:3 with lines lw 2 lc rgb '#1f77b4' notitle\nunset multiplot\n";
   run_gnuplot(path, out.str());
 }

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -80,6 +81,16 @@ Eigen::VectorXd quantities_per_joint(const std::string& option, const std::strin
   }
   if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
   return values;
+}
+
+Eigen::Vector3d read_direction(const std::string& text) {
+  static const std::map<std::string, Eigen::Vector3d> axes = {{"x", {1, 0, 0}}, {"-x", {-1, 0, 0}},
+                                                              {"y", {0, 1, 0}}, {"-y", {0, -1, 0}},
+                                                              {"z", {0, 0, 1}}, {"-z", {0, 0, -1}}};
+  if (const auto axis = axes.find(text); axis != axes.end()) return axis->second;
+  const Eigen::Vector3d given = parse_quantities("--direction", text, {"", "", ""});
+  if (given.isZero(0)) throw InputError("--direction", "is zero: a touch needs a direction");
+  return given.normalized();
 }
 
 CLI::Validator quantity(const std::string& unit, double least, double most,

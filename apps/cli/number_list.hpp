@@ -17,6 +17,10 @@ Eigen::VectorXd parse_quantities(const std::string& option, const std::string& t
 Eigen::VectorXd quantities_per_joint(const std::string& option, const std::string& text,
                                      const text::Units& units, double none = text::kNoNone);
 
+/// Returns the direction of length 1 that --direction says: "x", "-z" or "0,0.6,0.8". Throws
+/// InputError.
+Eigen::Vector3d read_direction(const std::string& text);
+
 /// Checks that an option is a quantity from `least` to `most`, in the SI unit `unit`, and turns it
 /// into a number without unit, as CLI::Option::transform asks for; `what` describes it. A
 /// refusal names the smaller unit with which a number without a unit would fit.

@@ -20,8 +20,8 @@ void PostureOption::add(CLI::App& command) {
                    "Take joint positions outside the limits, with a warning");
 }
 
-JointVector PostureOption::read(const RobotModel& model) const {
-  JointVector posture = controller::default_posture(model);
+JointVector PostureOption::read(const RobotModel& model, const JointVector& usual) const {
+  JointVector posture = usual.size() > 0 ? usual : controller::default_posture(model);
   if (!q.empty()) {
     posture = parse_quantities("--q", q, controller::joint_units(model, "rad", "m"));
     check("--q", model, posture);

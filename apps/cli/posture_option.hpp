@@ -11,15 +11,17 @@ namespace dashpot::apps {
 
 /// The options of a posture.
 struct PostureOption {
-  std::string q;                ///< empty: controller::default_posture
+  std::string q;                ///< empty: the default
   bool outside_limits = false;  ///< accept a posture outside the position limits, with a warning
   double refused = 1e-3;        ///< rad or m outside the limits from which on it is refused
   bool has_to_hold = false;     ///< refuse a posture that the arm cannot hold, or warn
 
   /// Adds --q and --outside-limits.
   void add(CLI::App& command);
+  /// Returns --q; `usual`, or without entries controller::default_posture, where it is missing.
   /// Throws InputError.
-  controller::JointVector read(const controller::RobotModel& model) const;
+  controller::JointVector read(const controller::RobotModel& model,
+                               const controller::JointVector& usual = {}) const;
   /// Refuses a posture outside the position limits, or warns of it; `option` names it. Throws
   /// InputError.
   void check(const std::string& option, const controller::RobotModel& model,

@@ -155,6 +155,13 @@ CommandedConfig load_commanded_config(const std::string& path) try {
   throw error.in_file(path);
 }
 
+JointVector posture_of(const std::string& config, const PostureOption& option,
+                       const controller::RobotModel& model) {
+  const bool starts =
+      option.q.empty() && has_key(text::parse_yaml(text::read_regular_file(config)), "scenario");
+  return option.read(model, starts ? load_scene(config).start : JointVector());
+}
+
 std::unique_ptr<sim::System> make_mechanism(const Scene& scene) {
   if (scene.matrices) {
     const MatrixSystem& system = *scene.matrices;

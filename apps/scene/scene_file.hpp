@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/scene/scene.hpp>
 
 #include <memory>
@@ -19,6 +20,11 @@ struct CommandedConfig {
 };
 /// Reads it from a configuration file or a scene, whose other keys are ignored. Throws InputError.
 CommandedConfig load_commanded_config(const std::string& path);
+
+/// Returns the posture of --q, else the start of the configuration's scenario, else the usual one.
+/// Throws InputError.
+JointVector posture_of(const std::string& config, const PostureOption& option,
+                       const controller::RobotModel& model);
 
 /// The mechanism of the scene.
 std::unique_ptr<sim::System> make_mechanism(const Scene& scene);

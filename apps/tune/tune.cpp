@@ -52,16 +52,6 @@ std::vector<controller::JointVector> listed(const TuneOptions& options,
   return some;
 }
 
-/// The posture of --q, or else the start of the configuration's scenario, or else the default.
-controller::JointVector posture_of(const TuneOptions& options,
-                                   const controller::RobotModel& model) {
-  const text::YamlNode document = text::parse_yaml(text::read_regular_file(options.config));
-  if (options.posture.q.empty() && has_key(document, "scenario")) {
-    return load_scene(options.config).start;
-  }
-  return options.posture.read(model);
-}
-
 TuneSite make_site(const TuneOptions& options) try {
   if (!options.config.empty()) {
     const controller::Config config = controller::load_config(options.config);
@@ -71,7 +61,7 @@ TuneSite make_site(const TuneOptions& options) try {
     auto other = design;
     const bool joint = design["mode"] == "joint";
     other[joint ? "joint_damping" : "damping"] = {{"ratio", 0.7}};
-    TuneStart start{posture_of(options, config.model),
+    TuneStart start{posture_of(options.config, options.posture, config.model),
                     {design, other},
                     options.config,
                     listed(options, config.model)};

@@ -2,6 +2,8 @@
 #include <dashpot/controller/base/impedance.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 
+#include <optional>
+
 namespace dashpot::controller {
 
 /// The gains of a controller and the loop that they act in, as its documentation states them.
@@ -29,6 +31,12 @@ struct AuditOptions : LoopTiming {
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
   /// Range of sampled postures, n, rad; without entries the position limits of the model.
   JointVector lower, upper;
+  /// Settings of Dashpot's controller, whose loop it then is; the members above say the same.
+  std::optional<Settings> settings = {};
 };
+
+/// Returns the gains, loop and range of a controller with these settings; a direction of the task
+/// that is not selected has no gains.
+AuditOptions audit_options(const Settings& settings);
 
 }  // namespace dashpot::controller

@@ -76,13 +76,10 @@ class TouchingTip {
   Eigen::MatrixXd mobility_;  ///< J_v M^-1 J_v', 3 x 3
 };
 
-/// Returns the least of the limits in axes, and diagonals of faces and space.
 ContactAt worst_of_thirteen(const TouchingTip& tip) {
   ContactAt best;
   best.limit.stiffness = std::numeric_limits<double>::infinity();
-  for (int i = 26; i > 13; --i) {  // (i - 13) and its negative are one direction
-    const int second = i / 3 % 3, third = i / 9;
-    const Vector3d n = (Vector3d(i % 3, second, third) - Vector3d::Ones()).normalized();
+  for (const Vector3d& n : contact_directions()) {
     if (best.direction.isZero() && tip.moves(n)) best.direction = n;
     tip.take_if_worse(n, best);
   }
@@ -111,21 +108,34 @@ HeldForce held_force(const TouchingTip& tip, const JointVector& weight, const Jo
                      const Vector3d& n) {
   HeldForce result{n, std::numeric_limits<double>::infinity(), -1, 0};
   const VectorXd a = tip.reach(n);
+  bool unknown = false;
   for (Eigen::Index i = 0; i < weight.size(); ++i) {
-    if (!(effort[i] > 0) || a[i] == 0) continue;
+    unknown = unknown || (a[i] != 0 && std::isinf(effort[i]));
+    if (a[i] == 0 || std::isinf(effort[i])) continue;
     const double force =
         std::max(0.0, (effort[i] - std::copysign(1.0, a[i]) * weight[i]) / std::abs(a[i]));
     if (force < result.force) result.force = force, result.joint = static_cast<int>(i);
   }
+  if (result.joint < 0 && unknown) result.force = std::numeric_limits<double>::quiet_NaN();
   const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> springs(
       tip.loop().system.stiffness);
   const VectorXd x = springs.solve(a);
-  const bool sprung = (tip.loop().system.stiffness * x - a).norm() <= 1e-6 * a.norm();
+  const bool sprung =
+      !a.isZero(0) && (tip.loop().system.stiffness * x - a).norm() <= 1e-6 * a.norm();
   result.deflection = sprung ? result.force * a.dot(x) : std::numeric_limits<double>::infinity();
   return result;
 }
 
 }  // namespace
+
+std::vector<Vector3d> contact_directions() {
+  std::vector<Vector3d> directions;
+  for (int i = 26; i > 13; --i) {  // (i - 13) and its negative are one direction
+    const int second = i / 3 % 3, third = i / 9;
+    directions.push_back((Vector3d(i % 3, second, third) - Vector3d::Ones()).normalized());
+  }
+  return directions;
+}
 
 ContactAt find_contact(const Audit& audit, const JointVector& q, const ContactOptions& options) {
   const TouchingTip tip(audit, q, options);

@@ -82,7 +82,28 @@ Impedance stated_impedance(const AuditOptions& stated, int n) {
   return Impedance(setpoint, n);
 }
 
+AuditOptions audit_options(const Settings& settings) {
+  AuditOptions options;
+  static_cast<LoopTiming&>(options) = timing_of(settings);
+  options.mode = settings.initial.mode;
+  options.gains = settings.initial.gains;
+  for (Index i = 0; i < 6; ++i) {
+    if (options.gains.directions[static_cast<std::size_t>(i)]) continue;
+    for (Matrix6* gain : {&options.gains.task_stiffness, &options.gains.task_damping}) {
+      gain->row(i).setZero();
+      gain->col(i).setZero();
+    }
+  }
+  options.margin = settings.limits.gain_margin;
+  options.null_projector = settings.null_projector;
+  options.lower = settings.limits.position_lower;
+  options.upper = settings.limits.position_upper;
+  options.settings = settings;
+  return options;
+}
+
 std::optional<Settings> designing_settings(const RobotModel& model, const AuditOptions& options) {
+  if (options.settings) return options.settings;
   const Gains& gains = options.gains;
   const bool any = options.mode == Mode::kJoint
                        ? gains.joint_damping_ratio > 0

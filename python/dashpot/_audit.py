@@ -117,9 +117,9 @@ class Contact(Result):
     missing_friction: float
     """Viscous friction that each joint lacks for passivity below the Nyquist frequency, N m s/rad."""
     weight: Array
-    """n, torque against gravity, N m."""
+    """n, against gravity, N m (N)."""
     effort: Array
-    """n, its limit, N m; 0: unknown."""
+    """n, its limit, N m (N); infinite: unknown."""
     forces: Array
     """8 x 6: direction in which the tip presses (3), force at which a joint reaches its limit (N),
     deflection of the springs there (m), and that joint, from 0; -1: none."""

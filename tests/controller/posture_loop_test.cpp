@@ -1,4 +1,5 @@
 // The closed loop at a posture, against the loop of a controller that runs there.
+#include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/posture_loop.hpp>
@@ -77,6 +78,12 @@ TEST(PostureLoop, IsThatOfAControllerThere) {
       EXPECT_TRUE(near(found.damping, wanted.damping, 1e-9 * (1 + wanted.damping.norm())));
       EXPECT_TRUE(near(found.stiffness, wanted.stiffness, 1e-9 * (1 + wanted.stiffness.norm())));
       ASSERT_EQ(found.stiffness_factor.rows(), wanted.stiffness_factor.rows());
+      if (!wrench.isZero(0)) continue;
+      settings.initial.mode = mode;
+      const LoopAt audited = Audit(model, audit_options(settings)).at(q);
+      EXPECT_TRUE(near(audited.system.damping, found.damping, 0));
+      EXPECT_TRUE(near(audited.system.stiffness, found.stiffness, 0));
+      EXPECT_EQ(audited.sampled.passive_stiffness, loop.sampled().passive_stiffness);
     }
   }
 }
