@@ -33,6 +33,9 @@ struct ArmOptions {
   PositionSensor position_sensor = PositionSensor::kMotor;  ///< of joints with elastic gears
   std::optional<Contact> stops;  ///< at the position limits; N m/rad and N m s/rad (N/m, N s/m)
   std::optional<Wall> wall;
+  /// What the wall is made of meanwhile instead; the energy of what is pressed in counts as the
+  /// world's work.
+  std::vector<Piece<Contact>> tables;
   std::vector<Piece<Vector6>> wrenches;  ///< of the world on the tip, at its origin, in base axes
   /// Bodies rigid at the tip, in its axes, beside the robot's payload: picked up at `begin`, put
   /// down at `end`. They come and go with the velocity of the tip, and their energy counts as the
@@ -116,6 +119,8 @@ class Arm : public System {
   Vector6 wrench_ = Vector6::Zero();
   Schedule<Inertia> loads_;
   const Inertia* load_ = nullptr;  // carried, of loads_
+  Schedule<Contact> tables_;
+  Contact touched_;  // of the wall
   bool frozen_ = false;
   ContactModes frozen_modes_ = 0;
 };

@@ -67,8 +67,8 @@ class System {
   /// Begins a segment at t (s), with the external forces of this time. Returns the time at which
   /// the next of them jumps, or infinity if none does.
   virtual double begin_segment(double t) noexcept = 0;
-  /// Takes up the bodies that are carried from t (s) on, before begin_segment. Returns their energy
-  /// at y, J.
+  /// Takes up the bodies that are carried, and the table that is touched, from t (s) on, before
+  /// begin_segment. Returns their energy at y, J.
   virtual double take_loads(double /*t*/, const StateVector& /*y*/) noexcept { return 0; }
   /// Computes y' at y; both have 2N + kWorkChannels entries.
   virtual void rates(const StateVector& y, StateVector& y_dot) noexcept = 0;

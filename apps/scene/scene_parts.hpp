@@ -28,6 +28,10 @@ void read_body(const text::YamlMapping& keys, double& mass, Vector3& center, Mat
   read_matrix(keys, "inertia", text::Units(3, "kg m^2"), inertia);
 }
 
+/// Reads stiffness and damping, in these units. Throws InputError.
+void read_contact(const text::YamlMapping& keys, const char* stiffness, const char* damping,
+                  sim::Contact& contact);
+
 /// Reads `commands`, of an arm. Throws InputError.
 void read_commands(const text::YamlMapping& root, lcmtypes::CommandLimits& limits);
 

@@ -203,6 +203,26 @@ void read_loads(const YamlMapping& scenario, Scene& scene) {
   }
 }
 
+/// What the wall is made of meanwhile.
+void read_tables(const YamlMapping& scenario, Scene& scene) {
+  static constexpr std::array<std::string_view, 4> kKeys = {"begin", "end", "stiffness", "damping"};
+  sim::ArmOptions& options = scene.arm->options;
+  if (scenario.has("tables") && !options.wall) {
+    throw scenario.error("tables", "need simulation.wall, which is their place");
+  }
+  for (const YamlMapping& keys : mappings(scenario, "tables", kKeys)) {
+    sim::Piece<sim::Contact> piece;
+    piece.end = std::numeric_limits<double>::infinity();
+    for (const char* key : {"begin", "stiffness"}) require(keys, key, scenario, "tables");
+    read_when(keys, scene, piece.begin, piece.end);
+    read_contact(keys, "N/m", "N s/m", piece.value);
+    if (!options.tables.empty() && piece.begin < options.tables.back().end) {
+      throw keys.error("begin", "is before the end of the table above it");
+    }
+    options.tables.push_back(piece);
+  }
+}
+
 /// The set-point that holds the arm where it starts, with the gains of the file.
 controller::Setpoint first_setpoint(const Scene& scene) {
   controller::Setpoint setpoint = scene.arm->config.settings.initial;
@@ -303,8 +323,8 @@ std::optional<JointVector> displaced(const RobotModel& model, const JointVector&
 }
 
 void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 7> kKeys = {
-      "duration", "start", "pushes", "loads", "steps", "faults", "ring_down"};
+  static constexpr std::array<std::string_view, 8> kKeys = {
+      "duration", "start", "pushes", "loads", "tables", "steps", "faults", "ring_down"};
   const YamlMapping keys = root.mapping("scenario", kKeys);
   read_number(keys, "duration", "s", kPositive, scene.duration);
   if (scene.duration > kLongest) throw keys.error("duration", "is more than 1e7 s");
@@ -314,12 +334,13 @@ void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene
     read_arm_start(keys, positions, scene);
     read_arm_pushes(keys, scene);
     read_loads(keys, scene);
+    read_tables(keys, scene);
     read_steps(keys, positions, scene);
     read_faults(keys, positions, scene);
   } else {
     read_system_start(keys, positions, scene);
     read_system_pushes(keys, positions, scene);
-    for (const char* key : {"loads", "steps", "faults"}) {
+    for (const char* key : {"loads", "tables", "steps", "faults"}) {
       if (keys.has(key)) throw keys.error(key, "is for robot arms; this scene is a system");
     }
   }

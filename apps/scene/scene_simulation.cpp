@@ -83,12 +83,6 @@ void read_sensors(const YamlMapping& simulation, const Units& positions, sim::Pl
   read_switch(keys, "difference_velocity", plant.difference_velocity);
 }
 
-void read_contact(const YamlMapping& keys, const char* stiffness, const char* damping,
-                  sim::Contact& contact) {
-  read_number(keys, "stiffness", stiffness, kPositive, contact.stiffness);
-  read_number(keys, "damping", damping, kNotNegative, contact.damping);
-}
-
 void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimulation& arm) {
   static constexpr std::array<std::string_view, 9> kKeys = {
       "drives",           "reflected_inertia", "viscous_friction",
@@ -145,6 +139,12 @@ void read_surroundings(const YamlMapping& simulation, sim::ArmOptions& options) 
 }
 
 }  // namespace
+
+void read_contact(const YamlMapping& keys, const char* stiffness, const char* damping,
+                  sim::Contact& contact) {
+  read_number(keys, "stiffness", stiffness, kPositive, contact.stiffness);
+  read_number(keys, "damping", damping, kNotNegative, contact.damping);
+}
 
 void read_simulation(const YamlMapping& root, const Units& positions, sim::PlantOptions& plant,
                      ArmSimulation* arm) {

@@ -53,7 +53,9 @@ Json chain_json(const controller::RobotModel& model) {
 ArmView::ArmView(const std::string& config) : config_(controller::load_config(config)) {
   try {
     const Scene scene = load_scene(config);
-    if (scene.arm) simulated_wall_ = scene.arm->options.wall;
+    if (!scene.arm) return;
+    simulated_wall_ = scene.arm->options.wall;
+    one_table_ = scene.arm->options.tables.empty();
   } catch (const InputError&) {  // a configuration without a scene
   }
 }
@@ -74,7 +76,7 @@ Json ArmView::chain() const {
   }
   if (simulated_wall_) {
     add_wall("simulated wall", simulated_wall_->point, simulated_wall_->normal.normalized(),
-             simulated_wall_->contact.stiffness);
+             one_table_ ? Json(simulated_wall_->contact.stiffness) : Json());
   }
   return document;
 }

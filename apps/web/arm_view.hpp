@@ -28,7 +28,7 @@ class ArmView {
   double gain_margin() const { return config_.settings.limits.gain_margin; }
 
   /// Returns the chain with {"walls": [{"name", "point", "normal", "stiffness"}]}. A wall's normal
-  /// points to the free side; a simulated wall has a stiffness, N/m, others null.
+  /// points to the free side; a simulated wall of constant stiffness has one, N/m, others null.
   nlohmann::ordered_json chain() const;
 
   /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if
@@ -44,6 +44,7 @@ class ArmView {
  private:
   controller::Config config_;
   std::optional<sim::Wall> simulated_wall_;  ///< of a scene
+  bool one_table_ = true;                    ///< its stiffness does not change
 };
 
 }  // namespace dashpot::apps

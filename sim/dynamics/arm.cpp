@@ -16,6 +16,14 @@ void require_not_negative(double value, const std::string& key, const char* unit
       key, "is " + std::to_string(value) + " " + unit + ", must be finite and not negative");
 }
 
+template <class Value>
+void require_pieces(const std::string& key, const std::vector<Piece<Value>>& pieces) {
+  for (const Piece<Value>& piece : pieces) {
+    if (!(piece.begin < piece.end))
+      throw InvalidScene(key, "a piece does not begin before it ends");
+  }
+}
+
 void validate(const ArmOptions& options) {
   if (!(options.friction_velocity > 0))
     throw InvalidScene("friction_velocity", "must be positive, rad/s");
@@ -33,9 +41,15 @@ void validate(const ArmOptions& options) {
   }
   for (const Piece<Vector6>& piece : options.wrenches) {
     if (!piece.value.allFinite()) throw InvalidScene("wrenches", "a piece is not finite");
-    if (!(piece.begin < piece.end))
-      throw InvalidScene("wrenches", "a piece does not begin before it ends");
   }
+  if (!options.tables.empty() && !options.wall) throw InvalidScene("tables", "need a wall");
+  for (const Piece<Contact>& piece : options.tables) {
+    require_not_negative(piece.value.stiffness, "tables: stiffness", "N/m");
+    require_not_negative(piece.value.damping, "tables: damping", "N s/m");
+  }
+  require_pieces("wrenches", options.wrenches);
+  require_pieces("tables", options.tables);
+  require_pieces("loads", options.loads);
   for (const Piece<Inertia>& piece : options.loads) {
     const Inertia& load = piece.value;
     require_not_negative(load.mass, "loads: mass", "kg");
@@ -47,8 +61,6 @@ void validate(const ArmOptions& options) {
     if (load.about_center != load.about_center.transpose() || solver.eigenvalues()[0] < 0) {
       throw InvalidScene("loads", "an inertia is not symmetric positive semidefinite");
     }
-    if (!(piece.begin < piece.end))
-      throw InvalidScene("loads", "a piece does not begin before it ends");
   }
 }
 
@@ -71,7 +83,8 @@ Arm::Arm(const Robot& robot, const ArmOptions& options)
       options_(options),
       bodies_(robot_),
       wrenches_(options.wrenches, Vector6::Zero()),
-      loads_(options.loads, Inertia()) {
+      loads_(options.loads, Inertia()),
+      tables_(options.tables, Contact()) {
   validate(options);
   for (int i = 0; i < robot.dof(); ++i) {
     const Joint& joint = robot.joints()[static_cast<std::size_t>(i)];
@@ -89,6 +102,7 @@ Arm::Arm(const Robot& robot, const ArmOptions& options)
   if (options.stops) forces_.push_back(&add_stops);
   if (options.wall) {
     options_.wall->normal.normalize();
+    touched_ = options.wall->contact;
     forces_.push_back(&add_wall);
   }
   if (!wrenches_.empty()) forces_.push_back(&add_wrench);
@@ -163,14 +177,19 @@ double Arm::begin_segment(double t) noexcept {
     next = wrenches_.next_edge(t);
   }
   if (!loads_.empty()) next = std::min(next, loads_.next_edge(t));
+  if (!tables_.empty()) next = std::min(next, tables_.next_edge(t));
   return next;
 }
 
 double Arm::take_loads(double t, const StateVector& y) noexcept {
-  if (loads_.empty() || load_ == &loads_.at(t)) return 0;
+  const Inertia* const load = loads_.empty() ? load_ : &loads_.at(t);
+  Contact table = tables_.empty() ? touched_ : tables_.at(t);
+  if (!tables_.empty() && table.stiffness == 0) table = options_.wall->contact;
+  if (load == load_ && table == touched_) return 0;
   const double before = stored_energy(y).sum();
-  load_ = &loads_.at(t);
-  robot_.carry(*load_);
+  touched_ = table;
+  if (load != load_) robot_.carry(*load);
+  load_ = load;
   return stored_energy(y).sum() - before;
 }
 
@@ -270,9 +289,9 @@ void Arm::add_stops(Arm& arm, const Sums& sums) noexcept {
 void Arm::add_wall(Arm& arm, const Sums& sums) noexcept {
   const Wall& wall = *arm.options_.wall;
   const double depth = arm.wall_depth(), rate = arm.wall_rate();
-  const ContactMode mode = arm.mode_of(kMaxJoints, wall.contact, depth, rate);
+  const ContactMode mode = arm.mode_of(kMaxJoints, arm.touched_, depth, rate);
   if (mode == ContactMode::kFree) return;
-  const ContactForce push = contact_force(wall.contact, mode, depth, rate);
+  const ContactForce push = contact_force(arm.touched_, mode, depth, rate);
   arm.bodies_.push_tip(Eigen::Vector3d(push.force * wall.normal));
   sums.work[kContactHeat] += push.loss;
 }
@@ -280,11 +299,10 @@ void Arm::add_wall(Arm& arm, const Sums& sums) noexcept {
 Eigen::Vector3d Arm::wall_force(const StateVector& y) noexcept {
   if (!options_.wall) return Eigen::Vector3d::Zero();
   bodies_.move_to(y.data(), y.data() + coordinates());
-  const Wall& wall = *options_.wall;
   const double depth = wall_depth(), rate = wall_rate();
-  const ContactMode mode = contact_mode(wall.contact, depth, rate);
+  const ContactMode mode = contact_mode(touched_, depth, rate);
   if (mode == ContactMode::kFree) return Eigen::Vector3d::Zero();
-  return contact_force(wall.contact, mode, depth, rate).force * wall.normal;
+  return contact_force(touched_, mode, depth, rate).force * options_.wall->normal;
 }
 
 void Arm::add_wrench(Arm& arm, const Sums& sums) noexcept {
@@ -319,7 +337,7 @@ ContactModes Arm::contact_modes(const StateVector& y) noexcept {
   }
   if (options_.wall) {
     bodies_.move_to(y.data(), y.data() + coordinates());
-    const ContactMode mode = contact_mode(options_.wall->contact, wall_depth(), wall_rate());
+    const ContactMode mode = contact_mode(touched_, wall_depth(), wall_rate());
     modes |= static_cast<ContactModes>(mode) << (2 * kMaxJoints);
   }
   return modes;
@@ -342,7 +360,7 @@ StoredEnergy Arm::stored_energy(const StateVector& y) noexcept {
       springs += contact_energy(*options_.stops, stop.depth);
     }
   }
-  if (options_.wall) springs += contact_energy(options_.wall->contact, wall_depth());
+  if (options_.wall) springs += contact_energy(touched_, wall_depth());
   return {kinetic, bodies_.gravity_energy(), springs};
 }
 

@@ -8,6 +8,14 @@ namespace dashpot::sim {
 struct Contact {
   double stiffness = 0;  ///< k >= 0, N/m or N m/rad
   double damping = 0;    ///< c >= 0, N s/m or N m s/rad
+
+  /// Both side by side.
+  Contact& operator+=(const Contact& other) noexcept {
+    stiffness += other.stiffness;
+    damping += other.damping;
+    return *this;
+  }
+  bool operator==(const Contact&) const = default;
 };
 
 enum class ContactMode : std::uint8_t {

@@ -1,5 +1,5 @@
 // dashpot contact as a user runs it, and the warning of an arm that cannot hold itself.
-#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/apps/scene_run.hpp>
 
 #include <cmath>
 
@@ -97,6 +97,101 @@ TEST(ContactOfAnArm, RefusesWhatIsNoTouch) {
   EXPECT_THAT(refusal({"--payload", "40"}),
               HasSubstr("--q: the arm cannot hold itself here: joint"));
   EXPECT_THAT(refusal({"--plot", "curve.txt"}), HasSubstr("--plot: "));
+}
+
+TEST(ContactOfAnArm, TakesAConfigurationOrScene) {
+  const std::string file = scene("panda_late_torque");
+  const Json of_scene = parse(run_program({"contact", file, "--json"}));
+  const Words options = {"--gains",
+                         file,
+                         "--mode",
+                         "joint",
+                         "--delay",
+                         "3",
+                         "--viscous-friction",
+                         "urdf",
+                         "--q",
+                         "0,-0.8,0,-2.3,0,1.6,0.8",
+                         "--json"};
+  const Json same = parse(run_program(of_panda("contact", options)));
+  EXPECT_EQ(of_scene["posture"]["q"], same["posture"]["q"]);
+  EXPECT_NEAR(of_scene["posture"]["limit"], same["posture"]["limit"],
+              1e-6 * same["posture"]["limit"].get<double>());
+  const Json audited = parse(run_program({"modes", file, "--json"}));
+  EXPECT_EQ(audited["intended_ratio"], 2);
+  EXPECT_EQ(audited["posture"]["q"], of_scene["posture"]["q"]);
+  EXPECT_GT(audited["posture"]["gain_margin"], 1.9);
+  expect_refusals({"contact", file}, {{{"--preset", "crisp"}, "config excludes --preset"},
+                                      {{"--delay", "2"}, "config excludes --delay"},
+                                      {{"--period", "2 ms"}, "config excludes --period"},
+                                      {{"--payload", "1"}, "config excludes --payload"}});
+  expect_refusals({"contact"}, {{{"--preset", "crisp"}, "--urdf: give a CONFIG, or --urdf with"}});
+}
+
+TEST(ContactOfAnArm, NamesTheUnitsOfEachJointAndWhatIsUnknown) {
+  const Scratch scratch;
+  const std::string link =
+      "><inertial><mass value='5'/><inertia ixx='1' iyy='1' izz='1' ixy='0' "
+      "ixz='0' iyz='0'/></inertial></link>";
+  const std::string urdf = scratch.write(
+      "lift.urdf",
+      "<robot name='r'><link name='base'/><link name='lift'" + link + "<link name='arm'" + link +
+          "<link name='tip'/><joint name='up' type='prismatic'><parent link='base'/><child "
+          "link='lift'/><axis xyz='0 0 1'/><limit lower='-1' upper='1' effort='0' velocity='1'/>"
+          "</joint><joint name='turn' type='continuous'><parent link='lift'/><child link='arm'/>"
+          "<axis xyz='0 0 1'/><limit effort='50' velocity='1'/></joint><joint name='end' "
+          "type='fixed'><parent link='arm'/><child link='tip'/><origin xyz='1 0 0'/></joint>"
+          "</robot>");
+  const Words words = {"contact",
+                       "--urdf",
+                       urdf,
+                       "--base",
+                       "base",
+                       "--tip",
+                       "tip",
+                       "--direction",
+                       "z",
+                       "--joint-stiffness",
+                       "500 N/m,50 N m/rad",
+                       "--joint-damping",
+                       "100 N s/m,10 N m s/rad"};
+  EXPECT_THAT(run_program(words).out, AllOf(HasSubstr("up      98.10  unknown     N        -\n"),
+                                            HasSubstr("turn     0          50.00  N m      0\n"),
+                                            HasSubstr("N m s/rad (N s/m) more of friction"),
+                                            HasSubstr("(0, 0, 1.0)   unknown      unknown  -\n")));
+  const Json hold = parse(run_program(joined(words, {"--json"})))["posture"]["hold"];
+  EXPECT_EQ(hold["limit"], Json({nullptr, 50}));
+  EXPECT_TRUE(hold["forces"][0]["force"].is_null());
+  EXPECT_EQ(hold["forces"][4]["force"], 50);
+}
+
+/// Three tables, the limit between the second and the third.
+TEST(ContactOfAnArm, IsWhereTheSimulatedOneBeginsToChatter) {
+  const Words words = {"contact", scene("touch"), "--direction", "z", "--json"};
+  const Json predicted = parse(run_program(words))["posture"];
+  EXPECT_GT(predicted["limit_lower"], 1e5);
+  EXPECT_LT(predicted["limit_upper"], 1e6);
+  const Scratch scratch;
+  const std::string csv = scratch.path("touch.csv");
+  EXPECT_EQ(run_scene(scene("touch"), {"--csv", csv}).status, 0);
+  const std::map<std::string, Numbers> run = table(csv);
+  const auto forces = [&](double from, double to) {
+    double least = 1e9, most = 0;
+    for (std::size_t i = 0; i < run.at("time").size(); ++i) {
+      if (run.at("time")[i] < from || run.at("time")[i] > to) continue;
+      least = std::min(least, run.at("contact_z")[i]);
+      most = std::max(most, run.at("contact_z")[i]);
+    }
+    return std::pair(least, most);
+  };
+  for (const double begin : {1.7, 4.2}) {  // at rest on the first and on the second
+    const auto [least, most] = forces(begin, begin + 0.2);
+    EXPECT_NEAR(least, 7.7, 0.5) << begin;
+    EXPECT_NEAR(most, 7.7, 0.5) << begin;
+  }
+  const auto [least, most] = forces(6.7, 6.9);  // off the third one, and onto it again
+  EXPECT_EQ(least, 0);
+  EXPECT_GT(most, 30);
 }
 
 TEST(TooHeavy, IsWarnedOfInOneLine) {

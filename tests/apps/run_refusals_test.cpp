@@ -22,7 +22,7 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
 
            {"ur5", "duration:", "duratoin:",
             "scenario.duratoin: unknown key; the keys are duration, start, pushes, loads, "
-            "steps, faults, ring_down (line 17)"},
+            "tables, steps, faults, ring_down (line 17)"},
            {"ur5", "scenario:", "watchdog: {setpoint_hold: 0.1 ms}\nscenario:",
             "scenario.start: the controller refuses it: set-point stale, holding"},
            {"ur5", "duration: 6 s", "duration: 6 kg",
@@ -71,6 +71,10 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
             "simulation.integrator.step: is 0.000500 s, too long for gears of 1.13e+03 rad/s: at "
             "most "
             "0.00044 s is possible, or adaptive steps, the default of such arms"},
+           {"ur5", "  steps:", "  tables: [{begin: 1 s, stiffness: 1 N/m}]\n  steps:",
+            "scenario.tables: need simulation.wall, which is their place (line 21)"},
+           {"panda", "tables:", "tables:\n    - {begin: 5 s, end: 6 s, stiffness: 1 N/m}",
+            "scenario.tables[2].begin: is before the end of the table above it (line 89)"},
            {"ur5", "  steps:", "  faults: [{begin: 1 s}]\n  steps:",
             "scenario.faults[1].begin: is of a fault that does nothing (line 21)"},
            {"ur5", "  steps:", "  faults: [{begin: 1 s, end: 0.5 s, frozen: true}]\n  steps:",

@@ -277,6 +277,7 @@ TEST_P(Audit, ClosesUnderTorquesAndPushes) {
   testing::Random random(722);
   Scene scene(GetParam(), random);
   scene.options.wrenches = {{0.105, 0.2, 20 * random.vector(6)}, {0.15, 0.5, 5 * random.vector(6)}};
+  scene.options.tables = {{0.1003, 0.2, {2e4, 0}}, {0.2, 0.3, {500, 30}}};
   for (const Method method : kMethods) {
     Arm arm(testing::robot_of(GetParam(), scene.parameters), scene.options);
     Plant plant(arm, fixed_steps(method, 2e-4), scene.q, scene.qd);
@@ -325,6 +326,18 @@ TEST(ArmOptions, ThatMakeNoSenseAreRefused) {
        }},
       {"wall: point: is not finite", [&](Options& o) { wall(o), o.wall->point.x() = 1 / 0.0; }},
       {"wall: normal: is zero or not finite", [&](Options& o) { wall(o), o.wall->normal = zero; }},
+      {"tables: need a wall",
+       [](Options& o) {
+         o.tables = {{0, 1, {1e4, 0}}};
+       }},
+      {"tables: damping: is -1.000000 N s/m, must be finite and not negative",
+       [&](Options& o) {
+         wall(o), o.tables = {{0, 1, {1e4, -1}}};
+       }},
+      {"tables: a piece does not begin before it ends",
+       [&](Options& o) {
+         wall(o), o.tables = {{1, 1, {1e4, 0}}};
+       }},
       {"wrenches: a piece does not begin before it ends",
        [](Options& o) {
          o.wrenches = {{2, 1, Vector6::Ones()}};

@@ -58,6 +58,7 @@ std::string mjcf(const sim::Robot& robot, const sim::ArmOptions& world,
                  const MujocoOptions& options, const Eigen::Vector3d& tip) {
   constexpr double kFar = 10;  // m, of a tendon's end
   if (!world.loads.empty()) throw sim::InvalidScene("loads", "are not for MuJoCo");
+  if (!world.tables.empty()) throw sim::InvalidScene("tables", "are not for MuJoCo");
   std::ostringstream out;
   out.precision(17);
   const double soft = kTimeConstant * options.step;
