@@ -3,6 +3,7 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/design/design_contact.hpp>
 #include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/apps/design/design_report.hpp>
 #include <dashpot/apps/report/text_table.hpp>
@@ -11,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -28,12 +30,20 @@ std::string key_of(const analysis::TaskImpedance& impedance) {
 }
 
 /// The stiffness (n x n) of the task springs, or of the joint springs if there is no task.
-Eigen::MatrixXd controlled_stiffness(const analysis::TaskImpedance& impedance) {
+Eigen::MatrixXd controlled_stiffness(const SystemEntry& entry) {
+  const analysis::TaskImpedance& impedance = entry.impedance;
   if (!impedance.jacobian || !impedance.task_stiffness) {
-    return impedance.stiffness.value_or(Eigen::MatrixXd());
+    if (!impedance.stiffness || entry.loop.passive_stiffness.size() == 0) {
+      return impedance.stiffness.value_or(Eigen::MatrixXd());
+    }
+    return *impedance.stiffness - entry.loop.passive_stiffness;
   }
   return impedance.jacobian->transpose() * *impedance.task_stiffness * *impedance.jacobian;
 }
+
+/// Largest ratio allowed with --contact. A damping against stiff touches overdamps the arm in the
+/// air, so that the default of a region is too low.
+constexpr double kMostAgainstTouches = 1e4;
 
 /// The damping for one system, and its effect in the loop if a loop is given.
 struct Found {
@@ -48,7 +58,7 @@ analysis::LoopLimit limit_of(const SystemEntry& entry, const DesignOptions& opti
   if (const double time = options.timing.integral_time; time > 0) {
     analysis::to_joint_space(given);  // throws for wrong sizes
     limit.loop.memory =
-        controller::integral_memory(controlled_stiffness(given) / time, limit.loop.period);
+        controller::integral_memory(controlled_stiffness(entry) / time, limit.loop.period);
   }
   return limit;
 }
@@ -195,7 +205,26 @@ DesignReport report_on_arm(const DesignOptions& options, const SystemEntry& entr
   }
 }
 
-RegionReport report_on_region(const SystemFile& file, const DesignOptions& options) {
+/// Returns the smallest damping ratio of the modes of all sampled loops with this damping.
+double sampled_ratio(const SystemFile& file, const DesignOptions& options,
+                     const Eigen::MatrixXd& damping) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const SystemEntry& entry : file.entries) {
+    const auto system = entry.system(analysis::with_damping(entry.impedance, damping));
+    const analysis::Spectrum<> spectrum = analysis::analyze(system);
+    const analysis::SampledSpectrum found =
+        analysis::sample_loop(system, spectrum, with_gears(limit_of(entry, options).loop));
+    for (const analysis::SampledMode& mode : found.modes) {
+      if (mode.natural_frequency > options.soft_frequency) {
+        smallest = std::min(smallest, mode.damping_ratio);
+      }
+    }
+  }
+  return smallest;
+}
+
+/// Returns the matrix for all configurations though it keeps no margin.
+RegionReport search_region(const SystemFile& file, const DesignOptions& options) {
   if (file.entries.empty()) throw InputError("", "lists no configurations");
   std::vector<analysis::TaskImpedance> configurations;
   for (const SystemEntry& entry : file.entries) {
@@ -219,6 +248,7 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
   region.target = options.target();
   region.structure = options.damping_structure();
   region.ceiling = options.largest_ratio;
+  if (options.contact > 0 && !region.ceiling) region.ceiling = kMostAgainstTouches;
   region.threads = options.threads;
   const StopSignal stop;
   region.progress = [](double done) {
@@ -235,18 +265,30 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
   try {
     RegionReport report{key_of(configurations[0]), options.ratio,
                         analysis::design_region(configurations, region)};
-    const analysis::RegionDesign& design = report.design;
-    if (!design.kept) {
-      throw lost_margin("no share of the damping found for the region", options, design.gain_margin,
-                        "a share of " + format_number(design.share, 3) + ", at configuration [" +
-                            std::to_string(design.margin_sample) + "]");
-    }
     if (options.timing.period > 0) report.limit = limit_of(file.entries[0], options);
+    if (report.limit && options.contact > 0) {
+      report.sampled_ratio = sampled_ratio(file, options, report.design.damping);
+    }
     return report;
   } catch (const analysis::InvalidSystem&) {
     for (const SystemEntry& entry : file.entries) report_on(entry, options);  // names the entry
     throw;
   }
+}
+
+RegionReport report_on_region(const SystemFile& file, const DesignOptions& options,
+                              const std::optional<controller::RobotModel>& model,
+                              const std::vector<JointVector>& postures) {
+  const auto search = [&](const SystemFile& all) { return search_region(all, options); };
+  RegionReport report = options.contact > 0
+                            ? design_for_contact(options, file, *model, postures, search)
+                            : search(file);
+  if (report.postures.empty()) report.postures = postures;
+  const analysis::RegionDesign& design = report.design;
+  if (design.kept) return report;
+  throw lost_margin("no share of the damping found for the region", options, design.gain_margin,
+                    "a share of " + format_number(design.share, 3) + ", at configuration [" +
+                        std::to_string(design.margin_sample) + "]");
 }
 
 /// The postures that the options ask for; the one of --q if they list none.
@@ -296,9 +338,8 @@ void run_design(const DesignOptions& options, OutputFile& csv) try {
       warn_of(*model, gains);
     }
   }
-  if (options.region) {
-    RegionReport report = report_on_region(file, options);
-    report.postures = std::move(postures);
+  if (options.region || options.contact > 0) {
+    RegionReport report = report_on_region(file, options, model, postures);
     report.assumes = assumed(options, model);
     if (csv) csv.write(region_csv(report));
     csv.finish();

@@ -87,6 +87,14 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
                    "Configurations of FILE, or postures of the arm: one matrix that raises their\n"
                    "smallest ratio");
   command
+      .add_option("--contact", options.contact,
+                  "Of an arm: one matrix in the air and against every stiffness up to this, N/m")
+      ->transform(quantity("N/m", kLeast, 1e12, "a stiffness up to 1e12, in N/m,"))
+      ->option_text("K");
+  command.add_option("--direction", options.direction, "Of the contact, in the base's axes")
+      ->option_text("x|y|z|a,b,c (any)")
+      ->check(not_empty());
+  command
       .add_option("--largest-ratio", options.largest_ratio, "With --region: no mode may have more")
       ->transform(a_ratio)
       ->option_text("R (1 or 1.5 Z)");
@@ -124,17 +132,22 @@ void check(const DesignOptions& options) {
   if (options.region && !arm.urdf.empty() && !options.postures.any()) {
     throw InputError("--region", "an arm needs --samples, --postures or --log with it");
   }
-  if (options.near && options.region) throw InputError("--near", "does not go with --region");
-  if (options.sensitivity && options.region) {
-    throw InputError("--sensitivity", "does not go with --region");
+  if (options.contact > 0 && arm.urdf.empty()) throw InputError("--contact", "needs --urdf");
+  if (!options.direction.empty() && options.contact == 0) {
+    throw InputError("--direction", "needs --contact");
   }
-  if (options.largest_ratio && !options.region) {
+  const bool many = options.region || options.contact > 0;
+  const std::string not_with =
+      options.region ? "does not go with --region" : "does not go with --contact";
+  if (options.near && many) throw InputError("--near", not_with);
+  if (options.sensitivity && many) throw InputError("--sensitivity", not_with);
+  if (options.largest_ratio && !many) {
     throw InputError("--largest-ratio", "needs --region");
   }
   if (options.largest_ratio && *options.largest_ratio < options.ratio) {
     throw InputError("--largest-ratio", "is below --damping-ratio");
   }
-  if (!options.csv.empty() && !options.region) throw InputError("--csv", "needs --region");
+  if (!options.csv.empty() && !many) throw InputError("--csv", "needs --region");
   if (options.timing.period == 0 && (given(options.timing) || options.margin != 2)) {
     throw InputError("--period",
                      "missing; --delay, --cutoff, --integral-time and --margin need it");

@@ -20,7 +20,9 @@ struct DesignOptions {
   double margin = 2;  ///< gain margin, if there is a period
   std::optional<double> largest_ratio;
   int threads = 0;
-  std::string csv;  ///< file for the map of the region; none if empty
+  std::string csv;        ///< file for the map of the region; none if empty
+  double contact = 0;     ///< stiffness up to which the ratio is to hold, N/m; 0: no contact
+  std::string direction;  ///< of the contact; all if empty
   bool near = false;
   bool region = false;
   bool sensitivity = false;

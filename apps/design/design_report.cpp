@@ -208,6 +208,37 @@ std::vector<RegionRow> rows_of(const RegionReport& report) {
   return rows;
 }
 
+/// Says up to which stiffness the ratio holds.
+std::string contact_text(const RegionReport& report) {
+  const std::string asked = format_number(report.asked_contact, 3) + " N/m";
+  const std::string ratio = "  The ratio of " + format_number(report.ratio, 3);
+  if (!report.contact)
+    return ratio + " does not hold in the air; up to " + asked + " were asked.\n";
+  if (*report.contact == report.asked_contact) {
+    return ratio + " holds in the air and against every stiffness up to " + asked + ".\n";
+  }
+  return ratio + " holds in the air and against every stiffness up to " +
+         format_number(*report.contact, 3) +
+         " N/m; with no damping that\n  was found it holds up to " + asked + ".\n";
+}
+
+/// Of a contact, the row with the least ratio for each stiffness.
+std::vector<RegionRow> shown_rows(const RegionReport& report) {
+  if (report.touches.empty()) return rows_of(report);
+  std::vector<RegionRow> rows;
+  for (const RegionRow& row : rows_of(report)) {
+    const auto same = std::find_if(rows.begin(), rows.end(), [&](const RegionRow& other) {
+      return report.touches[other.index].stiffness == report.touches[row.index].stiffness;
+    });
+    if (same == rows.end()) {
+      rows.push_back(row);
+    } else if (row.sample->damping_ratio < same->sample->damping_ratio) {
+      *same = row;
+    }
+  }
+  return rows;
+}
+
 std::vector<Field<RegionRow>> region_fields(const RegionReport& report) {
   using Sample = analysis::RegionSample;
   const auto real = [](double Sample::*member) {
@@ -257,6 +288,15 @@ std::vector<Field<RegionRow>> region_fields(const RegionReport& report) {
                       "gain_margin",
                       {Align::kPoint, {"gain", "margin"}, 3},
                       real(&Sample::gain_margin)});
+  }
+  if (!report.touches.empty()) {
+    fields.push_back(
+        {"touch", "touch [N/m]", {Align::kPoint, {"touch", "N/m"}, 3}, [&](const RegionRow& row) {
+           return Json(report.touches[row.index].stiffness);
+         }});
+    fields.push_back({"direction", "", {}, [&](const RegionRow& row) {
+                        return json_list(report.touches[row.index].direction);
+                      }});
   }
   if (!report.postures.empty()) {
     fields.push_back(
@@ -309,6 +349,11 @@ std::string region_json(const RegionReport& report) {
     result["loop"]["share"] = design.share;
     result["loop"]["margin_sample"] = design.margin_sample;
   }
+  if (!report.touches.empty()) {
+    result["contact"] = {{"asked", report.asked_contact}, {"holds_to", Json()}};
+    if (report.contact) result["contact"]["holds_to"] = *report.contact;
+    if (report.limit) result["contact"]["sampled_ratio"] = report.sampled_ratio;
+  }
   result["samples"] = json_of(rows_of(report), region_fields(report));
   return json_text(result);
 }
@@ -337,8 +382,13 @@ std::string region_table(const RegionReport& report) {
   } else if (report.limit) {
     text += loop_margin_text(design.gain_margin);
   }
-  if (report.limit) text += assumes_text(report.assumes);
-  return text + "\n" + table_of(rows_of(report), region_fields(report));
+  if (!report.touches.empty()) text += contact_text(report);
+  if (!report.touches.empty() && report.limit) {
+    text += "  The smallest ratio of the sampled loops is " +
+            format_number(report.sampled_ratio, 3) + ".\n";
+  }
+  if (report.limit || !report.touches.empty()) text += assumes_text(report.assumes);
+  return text + "\n" + table_of(shown_rows(report), region_fields(report));
 }
 
 std::string region_complaint(const RegionReport& report) {

@@ -35,7 +35,13 @@ struct DesignReport {
   bool gears = false;                ///< elastic, in `before` and `after`, but not in `design`
 };
 
-/// What `dashpot design --region` says.
+/// What the tip touches in a configuration: a spring, N/m, along a direction; 0: nothing.
+struct RegionTouch {
+  double stiffness = 0;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+};
+
+/// What `dashpot design --region` and `--contact` say.
 struct RegionReport {
   std::string key;
   double ratio = 0;
@@ -43,6 +49,10 @@ struct RegionReport {
   std::vector<std::string> assumes = {};
   std::vector<controller::JointVector> postures = {};  ///< of an arm, one for each sample
   std::optional<analysis::LoopLimit> limit = {};  ///< none if the loops are taken for continuous
+  std::vector<RegionTouch> touches = {};          ///< one for each sample; none without --contact
+  double asked_contact = 0;                       ///< N/m
+  double sampled_ratio = 0;  ///< with --contact, the smallest of all loops; 0 without a period
+  std::optional<double> contact = {};  ///< up to which the ratio holds, N/m; none: nowhere
 };
 
 std::string design_json(const std::vector<DesignReport>& reports, bool as_list);

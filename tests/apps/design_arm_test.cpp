@@ -43,5 +43,84 @@ TEST(DesignOfAnArm, TakesUnits) {
                     "--period", "0.001", "--cutoff", "200", "--viscous-friction", "1"}));
 }
 
+const Words kTouching = {"--task-stiffness",
+                         "600,600,600,40,40,40",
+                         "--drives",
+                         "panda",
+                         "--q",
+                         kPandaPose,
+                         "--damping-ratio",
+                         "0.7",
+                         "--direction",
+                         "0,0.6,0.8",
+                         "--json"};
+
+/// Against the modes of the matrices, at stiffnesses between those that were looked at.
+TEST(DesignForContact, HoldsTheRatioInTheAirAndAgainstEveryStiffness) {
+  const Json found =
+      parse(run_program(of_panda("design", joined(kTouching, {"--contact", "1e4"}))));
+  EXPECT_EQ(found["contact"], Json({{"asked", 1e4}, {"holds_to", 1e4}}));
+  EXPECT_EQ(found["samples"][0]["touch"], 0);
+  const Json arm =
+      parse(run_program(of_panda("inspect", {"--drives", "panda", "--q", kPandaPose, "--json"})));
+  const Rows J = arm["jacobian"];
+  Json system = {
+      {"mass", arm["mass_matrix"]}, {"jacobian", J}, {"task_damping", found["task_damping"]}};
+  for (const double k : {600., 600., 600., 40., 40., 40.}) {
+    Numbers row(6, 0);
+    row[system["task_stiffness"].size()] = k;
+    system["task_stiffness"].push_back(row);
+  }
+  for (const double k : {0., 7., 130., 900., 2345., 6e3, 9999.}) {
+    Rows spring(7, Numbers(7));
+    for (std::size_t i = 0; i < 7; ++i) {
+      for (std::size_t j = 0; j < 7; ++j) {
+        spring[i][j] = k * (0.6 * J[1][i] + 0.8 * J[2][i]) * (0.6 * J[1][j] + 0.8 * J[2][j]);
+      }
+    }
+    system["stiffness"] = spring;
+    for (const double ratio : of_modes(analyze_json(system.dump()), "damping_ratio")) {
+      EXPECT_GT(ratio, 0.999 * 0.7) << k;
+    }
+  }
+}
+
+TEST(DesignForContact, SaysUpToWhichStiffnessALoopBearsSuchDamping) {
+  const Words loop = {"--period", "1 ms", "--delay", "4", "--contact", "1e5"};
+  const Json found = parse(run_program(of_panda("design", joined(kTouching, loop))));
+  const double up_to = found["contact"]["holds_to"];
+  EXPECT_GT(up_to, 1e3);
+  EXPECT_LT(up_to, 1e5);
+  for (const Json& sample : found["samples"]) {
+    EXPECT_GE(sample["gain_margin"], 2) << sample["touch"];
+    EXPECT_GE(sample["damping_ratio"], 0.999 * 0.7) << sample["touch"];
+    EXPECT_LE(sample["touch"], up_to);
+  }
+  const Scratch scratch;
+  const Json task = {{"stiffness", {600, 600, 600, 40, 40, 40}},
+                     {"damping", found["task_damping"]}};
+  const std::string gains = scratch.write("gains.yaml", Json{{"gains", {{"task", task}}}}.dump());
+  const Json touching = parse(
+      run_program(of_panda("contact", {"--gains", gains, "--drives", "panda", "--q", kPandaPose,
+                                       "--delay", "4", "--direction", "0,0.6,0.8", "--json"})));
+  EXPECT_GT(touching["posture"]["limit_lower"], up_to);
+  Words table = joined(kTouching, loop);
+  std::erase(table, "--json");
+  EXPECT_THAT(run_program(of_panda("design", table)).out,
+              ::testing::HasSubstr(
+                  "The ratio of 0.700 holds in the air and against every stiffness up to "));
+}
+
+TEST(DesignForContact, RefusesWhatDoesNotGoTogether) {
+  expect_refusals({"design"}, {{{example("baxter7.yaml"), "--damping-ratio", "1", "--contact", "1"},
+                                "--contact: needs --urdf"}});
+  const Words arm =
+      of_panda("design", {"--task-stiffness", "600,600,600,40,40,40", "--damping-ratio", "0.7"});
+  expect_refusals(arm, {{{"--direction", "z"}, "--direction: needs --contact"},
+                        {{"--contact", "-1"}, "--contact: a stiffness up to 1e12"},
+                        {{"--contact", "1", "--direction", "0,0,0"}, "--direction: is zero"},
+                        {{"--contact", "1", "--sensitivity"}, "does not go with --contact"}});
+}
+
 }  // namespace
 }  // namespace dashpot::tests
