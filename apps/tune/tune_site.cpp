@@ -92,6 +92,12 @@ std::int64_t whole_number(const Json& asked, const char* key, std::int64_t most)
   return value.get<std::int64_t>();
 }
 
+double touched(const Json& told) {
+  constexpr double kMost = 1e9;  // N/m
+  if (told.is_number() && told.get<double>() >= 0 && told.get<double>() <= kMost) return told;
+  throw InputError("touches", "has to be a stiffness from 0 to 1e9 N/m");
+}
+
 }  // namespace
 
 TuneSite::TuneSite(TunedArm arm, TuneStart start)
@@ -165,7 +171,9 @@ Json TuneSite::answer(const std::string& path, const Json& asked) {
   const Json& place = wanted(asked, "place");
   if (!place.is_string()) throw InputError("place", "has to be a text");
   const controller::JointVector q = posture(wanted(asked, "q"), arm.model());
-  Json result = TunedLoop(arm, design).at(q, place.get<std::string>());
+  const TunedLoop loop(arm, design);
+  Json result = loop.at(q, place.get<std::string>());
+  if (asked.contains("touches")) result["contact"] = loop.contact(q, touched(asked["touches"]));
   result["refused"] = refusals(arm, design, q);
   result["warned"] = warnings(arm, design);
   return result;

@@ -29,7 +29,8 @@ class TuneSite {
   /// Answers a GET: the files of the page, and /setup.
   HttpAnswer get(const std::string& path) const;
   /// Answers a POST of JSON:
-  /// /design {"q", "place", "design"}: TunedLoop::at, and "refused";
+  /// /design {"q", "place", "design"}: TunedLoop::at, and "refused"; with "touches", N/m, also
+  /// "contact": TunedLoop::contact;
   /// /workspace {"design", "seed", "first", "count"}: TunedLoop::workspace.
   HttpAnswer post(const std::string& path, const std::string& body);
   /// The secret that a POST must have in its header kTokenHeader.

@@ -251,6 +251,7 @@ TunedDesign read_design(const TunedArm& arm, const Json& design) {
                      "times the tip's inertia");
   }
   result.settings = settings_of(arm, stated);
+  if (result.designed()) stated.settings = result.settings;
   return result;
 }
 

@@ -20,6 +20,11 @@ class TunedLoop {
   /// docs/tuning-page.md. Throws std::runtime_error if there is no spectrum.
   nlohmann::ordered_json at(const controller::JointVector& q, const std::string& place) const;
 
+  /// Returns the effect of touching a spring of this stiffness (N/m), in the direction with the
+  /// least limit: {"stiffness", "direction", "damping_ratio", "natural_frequency", "limit"}; 1e9:
+  /// no limit. Null without a period, and if the tip cannot move.
+  nlohmann::ordered_json contact(const controller::JointVector& q, double stiffness) const;
+
   /// Returns the numbers of postures of the sequence `seed`, computed by one thread for each
   /// processor, and the postures at which either number is the worst:
   /// {"count", "smallest_ratio", "gain_margin", "worst": {either: {"value", "q"}}}. After kLongest

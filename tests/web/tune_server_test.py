@@ -294,6 +294,28 @@ class TuneServer(unittest.TestCase):
         status, whole = self.server.post('/workspace', {'design': self.base, 'seed': 1, 'first': 0, 'count': 10})
         self.assertEqual((status, whole['count']), (200, 10))
 
+    def test_touch_is_that_of_contact(self):
+        with tempfile.NamedTemporaryFile('w', suffix='.yaml') as gains:
+            gains.write('gains: {task: {stiffness: [600, 600, 600, 30, 30, 30], damping_ratio: 0.7}}')
+            gains.flush()
+            friction = ','.join(map(str, self.server.setup['model']['viscous_friction']))
+            inertia = {'reflected_inertia': [0.3] * 7}
+            for damping, options in (({'factor': 2}, ['--stiffness', '600,600,600,30,30,30', '--damping-factor', '2']),
+                                     ({'ratio': 0.7}, ['--gains', gains.name])):
+                design = {'stiffness': [600] * 3 + [30] * 3, 'damping': damping, 'delay': 1, 'arm': inertia}
+                asked = {'q': self.q, 'place': 'tip/0', 'design': design}
+                status, answer = self.server.post('/design', asked | {'touches': 1e5})
+                self.assertEqual(status, 200, answer)
+                found = answer['contact']
+                expected = run('contact', *PANDA, *options, '--delay', '1', '--q', ','.join(map(repr, self.q)),
+                               '--viscous-friction', friction, '--reflected-inertia', '0.3', '--json', '--direction',
+                               ','.join(map(repr, found['direction'])))['posture']
+                self.assertAlmostEqual(found['limit'] / expected['limit'], 1, 5)
+                [ratio] = [point[1] for point in expected['curve'] if abs(point[0] - 1e5) < 1]
+                self.assertAlmostEqual(found['damping_ratio'], ratio, 9)
+        self.assertNotIn('contact', self.server.design(design))
+        self.assertEqual(self.server.post('/design', asked | {'touches': -1})[0], 400)
+
     def test_payload_has_inertia(self):
         payload = {'mass': 2, 'center': [0, 0, 0.1], 'inertia': [[0.03, 0, 0.002], [0, 0.04, 0], [0.002, 0, 0.02]]}
         found = self.server.design(self.base | {'arm': {'payload': payload}})

@@ -16,6 +16,10 @@ const kTotals = [
   ['overshoot, %', (x) => (x.release.overshoot === null ? null : x.release.overshoot * 100)],
   ['settling to 2 %, s', (x) => x.release.settling_time],
   ['free motions', (x) => x.soft_or_zero, (x) => (x === null ? number(x) : String(x))]];
+/// The same where the tip touches something.
+const kTouch = [
+  ['least ratio, touching', (x) => x.contact?.damping_ratio ?? null, number, (x) => x !== null && x < 0],
+  ['bears touches up to, N/m', (x) => x.contact?.limit ?? null, (x) => (x === 1e9 ? 'above 1e9' : number(x))]];
 
 const cell = (text, kind) => element('td', {class: kind || undefined}, text);
 const difference = (a, b) => (isNumber(a) && isNumber(b) ? (b > a ? '+' : '') + number(b - a, 3) : number(null));
@@ -44,7 +48,7 @@ function differentParts({setup, state}) {
 /// Notes on the sampled loop of a design, and on its ratio there.
 function loopWords(name, found) {
   if (!found) return [];
-  const {limit, damping_level: level, assumes} = found;
+  const {limit, damping_level: level, assumes, contact} = found;
   return [
     unstable(found) &&
       `${name} is unstable in the sampled loop: an arm would not show its ratios and its motion`,
@@ -54,7 +58,8 @@ function loopWords(name, found) {
       `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % by the gain margin of the loop`,
     assumes.length > 0 && `The loop of ${name} assumes: ${assumes.join(', ')}`,
     limit && `${name} is limited by a motion at ${number(limit.frequency, 3)} rad/s` +
-      `${limit.joint ? `, most of it in ${limit.joint}` : ''}`].filter(Boolean);
+      `${limit.joint ? `, most of it in ${limit.joint}` : ''}`,
+    contact && `${name} bears least along (${contact.direction.map((x) => number(x, 2)).join(', ')})`].filter(Boolean);
 }
 
 export function fillComparison(page) {
@@ -65,7 +70,8 @@ export function fillComparison(page) {
       element('td', {}, markElement(i + 1), ` ${i + 1}`), ...modes.flatMap((mode, k) => modeCells(mode, both[k])),
       cell(difference(...modes.map((mode) => mode?.damping_ratio))));
   }));
-  $('totals').replaceChildren(...kTotals.map(([name, get, write = number, isBad = () => false]) => {
+  const totals = [...kTotals, ...(page.state.touches > 0 ? kTouch : [])];
+  $('totals').replaceChildren(...totals.map(([name, get, write = number, isBad = () => false]) => {
     const values = both.map((x) => (x ? get(x) : null));
     const cells = values.map((x) => cell(write(x), isBad(x) && 'bad'));
     return element('tr', {}, cell(name), ...cells, cell(difference(...values)));

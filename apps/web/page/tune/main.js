@@ -12,7 +12,7 @@ import {fillComparison} from './comparison.js';
 import {kDesigns, kTaskAxes, nameOf} from './designs.js';
 import {dragTip} from './drag_tip.js';
 import {fillExport, listenToExport} from './export_panel.js';
-import {Form} from './form_fields.js';
+import {at, Form} from './form_fields.js';
 import {gainFields, structure} from './gain_fields.js';
 import {drawMotion} from './motion.js';
 import {showRefusals} from './refusals.js';
@@ -23,6 +23,9 @@ import {drawWorkspace} from './workspace.js';
 /// The fields, built again if the design needs others, and the buttons that follow the state.
 function makeFields(page) {
   const form = new Form((change, ended) => page.edit(change, ended)), posture = postureFields(form, page);
+  posture.push(form.slider({label: 'touches', key: 'touches', unit: 'N/m', low: 1, high: 1e6, log: true,
+    ...at(() => page.state, 'touches')}));
+  $('touch').append(posture.at(-1).element);
   let fields = [], built = '';
   return () => {
     const {state, store} = page, key = `${state.edited} ${structure(page.design())}`;

@@ -1,4 +1,5 @@
-// The state that is edited, {q, place, motion, edited: 'a' or 'b', a, b}, with undo and the address that holds it.
+// The state that is edited, {q, place, motion, touches, edited: 'a' or 'b', a, b}, with undo and the address that holds
+// it.
 
 const fits = (a, b) => a !== null && typeof a === typeof b && Array.isArray(a) === Array.isArray(b);
 

@@ -23,7 +23,7 @@ export class Tuning {
     keepErrors(this.errors);
     Object.assign(this, {setup, redraw});
     const {q, designs: [a, b]} = setup;
-    this.store = new Store({q, place: 'tip/0', motion: 'step', edited: 'a', a, b}, () => {
+    this.store = new Store({q, place: 'tip/0', motion: 'step', touches: 0, edited: 'a', a, b}, () => {
       this.current = false;
       this.moved = this.workspace.moved = performance.now();
       changed();
@@ -52,8 +52,8 @@ export class Tuning {
   }
 
   ask() {
-    const {q, place} = this.state;
-    for (const name of kDesigns) this.questions[name].ask({q, place, design: this.design(name)});
+    const {q, place, touches} = this.state, touch = touches > 0 ? {touches} : {};
+    for (const name of kDesigns) this.questions[name].ask({q, place, ...touch, design: this.design(name)});
   }
   hear(name, heard, asked) {
     this.problem[name] = heard.error || '';
@@ -72,7 +72,7 @@ export class Tuning {
   noteDrawn() {
     const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
     this.current = kDesigns.every((name) => this.asked[name] && same(this.asked[name].design, this.design(name)) &&
-      same(this.asked[name].q, this.state.q));
+      same(this.asked[name].q, this.state.q) && (this.asked[name].touches || 0) === this.state.touches);
     if (!this.current || !this.moved) return;
     this.timing.push(performance.now() - this.moved);
     this.moved = 0;
