@@ -97,11 +97,11 @@ struct ArmMap {
   }
 };
 
-/// Largest |z| of the motions that are faster than `slowest`, 1/s.
-inline double spectral_radius(const Eigen::MatrixXd& map, double period, double slowest = 0.01) {
+/// Largest |z| of the motions that are faster than 0.01 1/s.
+inline double spectral_radius(const Eigen::MatrixXd& map, double period) {
   double largest = 0;
   for (const std::complex<double>& z : map.eigenvalues()) {
-    if (std::abs(std::log(z)) / period > slowest) largest = std::max(largest, std::abs(z));
+    if (std::abs(std::log(z)) / period > 0.01) largest = std::max(largest, std::abs(z));
   }
   return largest;
 }
