@@ -1,5 +1,5 @@
 // The stiffness of an arm that holds a load: against differences of the law's torque and the
-// load's. The simulated counterpart is tests/sim/loaded_modes_test.cpp.
+// load's. python/tests/test_mujoco.py has the modes of the motion under a load.
 #include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
