@@ -9,6 +9,7 @@
 namespace dashpot::tests {
 namespace {
 
+using testing::ElementsAre;
 using testing::IsEmpty;
 
 /// All files of a source are one component: "analysis/base/solver_status" has solver_status.hpp and
@@ -56,6 +57,29 @@ TEST(Tree, IncludesOnlyWhatTheTableOfRoomsAllows) {
     }
   }
   EXPECT_THAT(offences, IsEmpty());
+}
+
+// Of another library, in quotes, of higher steps, unknown.
+TEST(Rooms, AllowOnlyLowerStepsAndPublicHeaders) {
+  const std::string bad =
+      "#include <kdl/chain.hpp>\n #  include \"types.hpp\"  // why\n"
+      "#include <dashpot/analysis/tracked_spectrum.hpp>\n"
+      "#include <dashpot/analysis/sampled/sampled_data_model.hpp>\n"
+      "#include <dashpot/analysis/unknown.hpp>\n";
+  const std::string good =
+      "#include <vector>\n#include <Eigen/Core>\n// #include <lcm/lcm.h>\n"
+      "#include <dashpot/analysis/matrix_types.hpp>\n#include <dashpot/analysis/linalg/lu.hpp>\n";
+  EXPECT_THAT(
+      forbidden_includes("analysis/mode.hpp", good + bad),
+      ElementsAre("<kdl/chain.hpp>", "\"types.hpp\"", "<dashpot/analysis/tracked_spectrum.hpp>",
+                  "<dashpot/analysis/sampled/sampled_data_model.hpp>",
+                  "<dashpot/analysis/unknown.hpp>"));
+  EXPECT_THAT(forbidden_includes("controller/law/x.hpp",
+                                 "#include <dashpot/analysis/linalg/lu.hpp>\n"
+                                 "#include <dashpot/analysis/mode.hpp>\n"),
+              ElementsAre("<dashpot/analysis/linalg/lu.hpp>"));
+  EXPECT_EQ(room_of("analysis/unknown/status.cpp"), nullptr);
+  EXPECT_EQ(cycle_text({{"a", {"b"}}, {"b", {"c", "d"}}, {"c", {}}, {"d", {"b"}}}), "b -> d -> b");
 }
 
 TEST(Tree, KeepsEverySourceInARoom) {

@@ -17,8 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::Contains;
+using testing::ElementsAre;
 using testing::Field;
 using testing::IsEmpty;
+using testing::SizeIs;
 
 TEST(Tree, IsRead) {
   EXPECT_THAT(files(), Contains(Field(&File::path, "CMakeLists.txt")));
@@ -100,6 +102,19 @@ TEST(Documents, LinkOnlyToFilesAndHeadingsThatExist) {
   }
   EXPECT_THAT(offences, IsEmpty());
   EXPECT_GT(links, 50);
+}
+
+TEST(Rules, FindOffences) {
+  const File here{"docs/a.md", "# One: x_y\n```\n# no\n```\n# B\n# B\n"};
+  const std::vector<Link> links =
+      relative_links("[a](no.md) `[b](c.md)` [d\ne](../README.md#no) [f](https://g.h)");
+  ASSERT_EQ(links.size(), 2U);
+  EXPECT_EQ(offence(here, links[0]), "there is no docs/no.md");
+  EXPECT_EQ(offence(here, links[1]), "README.md has no heading #no");
+  EXPECT_THAT(anchors(here.text), ElementsAre("one-x_y", "b", "b-1"));
+  EXPECT_THAT(forbidden_words("see /" + std::string("home/ann")), SizeIs(1));
+  EXPECT_TRUE(includes_threads("#pragma once\n # include <future>  // async\n"));
+  EXPECT_FALSE(starts_with_pragma_once("// A comment.\n#pragma once\n"));
 }
 
 TEST(Documents, KeepTheReadmeShort) {
