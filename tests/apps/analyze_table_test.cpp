@@ -119,14 +119,6 @@ TEST(Program, ExplainsItself) {
   }
 }
 
-TEST(Program, WantsASubcommandItKnows) {
-  for (const Words& words : {Words{}, Words{"analyse"}, Words{"--jsno"}}) {
-    const Outcome outcome = run_program(words);
-    expect_refusal(outcome, "");
-    EXPECT_THAT(outcome.err, StartsWith("dashpot: "));
-  }
-}
-
 TEST(Program, FailsIfItCannotWrite) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
   const Outcome outcome = run_program({"analyze", example("chain3.yaml")}, "", "/dev/full");

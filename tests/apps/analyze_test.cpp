@@ -14,11 +14,15 @@ TEST(Analyze, AnswersAListWithAListAndReadsJson) {
   expect_near({of_modes(one, "damping_ratio")}, {{0.1}}, 1e-15);
   const Json result = analyze_json(
       "- {mass: &m [[1]], stiffness: [[4]]}\n- {mass: *m, stiffness: [[9]]}\n"
-      "- {mass: [], stiffness: []}\n");
-  ASSERT_EQ(result.size(), 3u);
+      "- {mass: [], damping: [], stiffness: [], times: [0, 1], force: []}\n- {mass: []}\n");
+  ASSERT_EQ(result.size(), 4u);
   expect_near({of_modes(result[0], "natural_frequency")}, {{2}}, 1e-15);
   expect_near({of_modes(result[1], "natural_frequency")}, {{3}}, 1e-15);
-  EXPECT_EQ(result[2]["dof"], 0);
+  for (const std::size_t i : {2U, 3U}) {
+    EXPECT_EQ(result[i]["dof"], 0);
+    EXPECT_EQ(result[i]["modes"], Json::array());
+    EXPECT_EQ(result[i]["zero_modes"], Json::array());
+  }
   EXPECT_EQ(analyze_json("[]"), Json::array());
   EXPECT_TRUE(analyze_json("[{mass: [[1]], stiffness: [[4]]}]").is_array());
 }
@@ -46,20 +50,6 @@ TEST(Analyze, AddsTheGeometricStiffnessAndTheJacobiansRate) {
   expect_near(general["reduced"]["stiffness"], {{11, 4}, {5, 6}}, 1e-15);
   EXPECT_EQ(general["notes"],
             Json::parse(R"(["stiffness is not symmetric: solved as a general problem"])"));
-}
-
-TEST(Analyze, AddsTheJacobiansRateOfARedundantArm) {
-  // The springs act along (2, 1) only, K = (1, 0.5)' (101, 53): the momentum that they do not
-  // change is (-0.5, 1) M q' = -0.5 q1' + 0.75 q2', and so the reduced system has q = (1, 2/3) q1.
-  const Json result = analyze_json(
-      "mass: [[2, 0.5], [0.5, 1]]\njacobian: [[1, 0.5]]\ntask_stiffness: [[100]]\n"
-      "task_damping: [[10]]\njacobian_rate: [[0.1, 0.3]]\n");
-  expect_near(result["constraint_matrix"], {{1}, {2.0 / 3}}, 1e-14);
-  expect_near(result["reduced"]["mass"], {{28.0 / 9}}, 1e-14);
-  expect_near(result["reduced"]["damping"], {{160.0 / 9}}, 1e-13);
-  expect_near(result["reduced"]["stiffness"], {{1636.0 / 9}}, 1e-12);
-  expect_near({of_modes(result, "natural_frequency")}, {{std::sqrt(409.0 / 7)}}, 1e-13);
-  expect_near({of_modes(result, "damping_ratio")}, {{20 / 7.0 / std::sqrt(409.0 / 7)}}, 1e-13);
 }
 
 TEST(Analyze, SettlesWhereSeveralCriticalModesCoincide) {
@@ -99,23 +89,6 @@ TEST(Analyze, SumsTheResponsesToAllThatIsGiven) {
   EXPECT_EQ(response["times"], Json::parse("[2.0, 0.0, 0.7]"));
   expect_near(response["position"], position, 1e-14);
   expect_near(response["velocity"], velocity, 1e-14);
-}
-
-TEST(Analyze, SettlesWhereTheForceHoldsTheSpring) {
-  const Json result =
-      analyze_json("mass: [[1]]\ndamping: [[2]]\nstiffness: [[4]]\nforce: [2]\ntimes: [0, 50]\n");
-  expect_near(result["response"]["position"], {{0}, {0.5}}, 1e-14);
-}
-
-TEST(Analyze, NeedsNoJoints) {
-  for (const std::string text :
-       {"mass: []", "mass: []\ndamping: []\nstiffness: []\ntimes: [0, 1]\nforce: []\n"}) {
-    const Json result = analyze_json(text);
-    EXPECT_EQ(result["dof"], 0);
-    EXPECT_EQ(result["modes"], Json::array());
-    EXPECT_EQ(result["zero_modes"], Json::array());
-    EXPECT_EQ(analyze_text(text).status, 0);
-  }
 }
 
 TEST(Analyze, NamesTheKindsOfModesAndPutsTheSlowerOfTwoRealEigenvaluesFirst) {

@@ -23,6 +23,8 @@ TEST(Mistakes, InNamesOfSubcommandsAreGuessed) {
     expect_refusal(run_program({word, "x"}),
                    std::string("'") + word + "' is not a subcommand; did you mean " + meant + "?");
   }
+  for (const Words& words : {Words{}, Words{"--jsno"}})
+    expect_refusal(run_program(words), "dashpot: ");
   expect_refusal(run_program({"help"}), "dashpot --help is meant");
   expect_refusal(run_program({"version"}), "dashpot --version is meant");
   expect_refusal(run_program({"x"}), "'x' is not a subcommand; there are analyze, inspect, ");

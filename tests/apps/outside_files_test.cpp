@@ -140,18 +140,5 @@ TEST(Inputs, ThatNeverEndOrKeepWaitingAreRefused) {
                   "dashpot analyze: /dev/zero: larger than 64 MiB");
 }
 
-// From the robot's description the plugin has it, and the host that loads the plugin.
-TEST(Inputs, NestedDeeplyAreRefused) {
-  const Scratch scratch;
-  std::string nested;
-  for (int i = 0; i < 100'000; ++i) nested += "<a>";
-  const std::string urdf = scratch.write("deep.urdf", "<robot name='r'>" + nested);
-  const std::string path = changed(scratch, "ur5", "../models/ur5.urdf", "deep.urdf");
-  expect_one_line(run_scene(path), "dashpot run: " + path + ": robot: " + urdf +
-                                       ": line 1: elements are nested more than 64 deep (line 5)");
-  expect_one_line(run_program({"inspect", "--urdf", urdf, "--base", "a", "--tip", "b"}),
-                  "dashpot inspect: " + urdf + ": line 1: elements are nested more than 64 deep");
-}
-
 }  // namespace
 }  // namespace dashpot::tests
