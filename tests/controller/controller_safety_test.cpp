@@ -58,18 +58,6 @@ TEST_F(Safety, TorqueLimitClamps) {
   EXPECT_GT(std::abs(snapshot().law_torque[1]), 3.0);
 }
 
-TEST_F(Safety, TorqueRateLimitClampsEveryTick) {
-  settings.limits.torque_rate *= 1e-2;
-  make();
-  run(1.0);
-  arm->state.velocity[3] = 0.5;  // a push: the damper wants a jump
-  JointVector last = arm->torque;
-  EXPECT_GE(next(), Status::kTorqueLimited);
-  EXPECT_LE(
-      ((arm->torque - last).cwiseAbs() - settings.limits.torque_rate * settings.period).maxCoeff(),
-      1e-12);
-}
-
 TEST_F(Safety, OutsideAPositionLimitReturnsSlowlyAndWaitsForItsRelease) {
   JointVector q = testing::panda_ready();
   const double lower = settings.limits.position_lower[3];

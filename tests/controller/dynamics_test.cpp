@@ -1,8 +1,6 @@
-// The dynamics against KDL's solvers, against derivatives of pose and energy, and kernels of
-// different size against one another.
+// The dynamics against KDL's solvers and published figures.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
-#include <dashpot/controller/kdl_chain.hpp>
 #include <dashpot/controller/model/mass_change.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/dynamics_match.hpp>
@@ -173,92 +171,6 @@ TEST(Dynamics, PassOnWhatIsNotFiniteAndRefuseStatesOfAnotherSize) {
   EXPECT_FALSE(result.p_BT_B.allFinite());
   EXPECT_THROW(evaluate(model, JointVector::Zero(6), zero), std::invalid_argument);
   EXPECT_THROW(evaluate(model, zero, JointVector::Zero(8)), std::invalid_argument);
-}
-
-std::vector<RobotModel> models() {
-  std::vector<RobotModel> all;
-  for (const auto& arm : arms()) all.push_back(arm_model(arm));
-  for (const int n : {1, 3, 5, 9}) {
-    all.push_back(RobotModel::from_urdf_text(
-        RandomRobot(100 + static_cast<unsigned>(n)).chain(n, 0.3), "link0", "tip"));
-  }
-  return all;
-}
-
-/// (f(x + h) - f(x - h)) / 2h by fourth order, to about 1e-6.
-template <class Function>
-auto derivative(const Function& f) {
-  constexpr double h = 1e-4;
-  return ((8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)).eval();
-}
-
-TEST(Dynamics, HaveTheDerivativesOfThePoseForJAndJdot) {
-  Random random(722);
-  for (const RobotModel& model : models()) {
-    SCOPED_TRACE(model.name());
-    const JointVector q = random.vector(model.dof()), qd = random.vector(model.dof());
-    const DynamicsResult at = evaluate(model, q, qd);
-    const auto moved = [&](double h) { return evaluate(model, q + h * qd, qd); };
-    const Eigen::Vector3d v = derivative([&](double h) { return moved(h).p_BT_B; });
-    const Eigen::Matrix3d spin =
-        derivative([&](double h) { return moved(h).R_BT; }) * at.R_BT.transpose();
-    const Vector6 twist = at.J * qd;
-    EXPECT_TRUE(near(twist.head<3>(), v, 1e-5));
-    EXPECT_TRUE(near(twist.tail<3>(), Eigen::Vector3d(spin(2, 1), spin(0, 2), spin(1, 0)), 1e-5));
-    const Vector6 drift = derivative([&](double h) { return (moved(h).J * qd).eval(); });
-    EXPECT_TRUE(near(at.Jdot_qd, drift, 1e-6 * std::max(10.0, drift.cwiseAbs().maxCoeff())));
-  }
-}
-
-/// Potential energy of the chain's masses, from KDL's frames alone.
-double potential(const RobotModel& model, const JointVector& q) {
-  const KDL::Chain& chain = kdl_chain(model);
-  KDL::Frame frame;
-  double energy = 0;
-  for (int i = 0; i < model.dof(); ++i) {
-    const KDL::Segment& segment = chain.getSegment(static_cast<unsigned>(i));
-    frame = frame * segment.pose(q[i]);
-    const KDL::Vector center = frame * segment.getInertia().getCOG();
-    energy -= segment.getInertia().getMass() *
-              model.gravity().dot(Eigen::Vector3d(center.x(), center.y(), center.z()));
-  }
-  return energy;
-}
-
-/// Change of energy in 0.2 s less the work of a constant torque, relative to the kinetic energy at
-/// the end, by Runge and Kutta in steps of h.
-double imbalance(const RobotModel& model, JointVector q, JointVector qd, const JointVector& torque,
-                 double h) {
-  const auto acceleration = [&](const JointVector& p, const JointVector& v) -> JointVector {
-    const DynamicsResult d = evaluate(model, p, v);
-    return Eigen::LLT<Eigen::MatrixXd>(d.M).solve(torque - d.coriolis - d.gravity);
-  };
-  const auto kinetic = [&] { return 0.5 * qd.dot(evaluate(model, q, qd).M * qd); };
-  const JointVector start = q;
-  const double before = kinetic() + potential(model, q);
-  for (int i = 0; i < std::lround(0.2 / h); ++i) {
-    const JointVector a = acceleration(q, qd), v2 = qd + h / 2 * a;
-    const JointVector b = acceleration(q + h / 2 * qd, v2), v3 = qd + h / 2 * b;
-    const JointVector c = acceleration(q + h / 2 * v2, v3), v4 = qd + h * c;
-    const JointVector d = acceleration(q + h * v3, v4);
-    q += h / 6 * (qd + 2 * v2 + 2 * v3 + v4);
-    qd += h / 6 * (a + 2 * b + 2 * c + d);
-  }
-  const double gain = kinetic() + potential(model, q) - before;
-  return std::abs(gain - torque.dot(q - start)) / kinetic();
-}
-
-TEST(Dynamics, LetEnergyGrowByTheWorkOfTheTorques) {
-  Random random(725);
-  for (const RobotModel& model : models()) {
-    const int n = model.dof();
-    const JointVector q = 0.5 * random.vector(n), qd = 0.5 * random.vector(n);
-    const JointVector torque = evaluate(model, q, qd).gravity + 0.1 * random.vector(n);
-    const double coarse = imbalance(model, q, qd, torque, 2e-3);
-    const double fine = imbalance(model, q, qd, torque, 1e-3);
-    EXPECT_LT(fine, 1e-6) << model.name() << n;
-    EXPECT_TRUE(fine < coarse / 8 || fine < 1e-10) << coarse << " " << fine;  // of fourth order
-  }
 }
 
 }  // namespace

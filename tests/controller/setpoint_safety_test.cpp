@@ -19,27 +19,14 @@ using testing::Safety;
 TEST_F(Safety, RejectsBadSetpointsAndKeepsTheLastGoodOne) {
   run(1.0);
   const double nan = std::nan("");
+  // setpoint_check_test.cpp has all bounds.
   const std::vector<std::pair<const char*, std::function<void(Setpoint&)>>> spoilers = {
       {"NaN", [&](Setpoint& s) { s.joint_position[2] = nan; }},
-      {"wrong size", [](Setpoint& s) { s.joint_position.conservativeResize(6); }},
-      {"no position", [](Setpoint& s) { s.joint_position.resize(0); }},
-      {"unreachable", [](Setpoint& s) { s.joint_position[3] = 0.5; }},
-      {"gains of wrong size", [](Setpoint& s) { s.gains.joint_stiffness.setIdentity(6, 6); }},
       {"indefinite", [](Setpoint& s) { s.gains.joint_damping(0, 0) = -1; }},
-      {"asymmetric", [](Setpoint& s) { s.gains.joint_stiffness(0, 1) += 1; }},
       {"infinite gain", [](Setpoint& s) { s.gains.joint_stiffness(0, 0) = kInfinity; }},
-      {"huge gain", [](Setpoint& s) { s.gains.joint_stiffness(0, 0) = 1e10; }},
-      {"wrench", [&](Setpoint& s) { s.wrench[3] = nan; }},
-      {"mode", [](Setpoint& s) { s.mode = static_cast<Mode>(7); }},
       {"time to come", [](Setpoint& s) { s.time += 1'000'000'000; }},
       {"no rotation", [](Setpoint& s) { s.mode = Mode::kCartesian, s.tip_pose.rotation *= 1.001; }},
       {"reflection", [](Setpoint& s) { s.mode = Mode::kCartesian, s.tip_pose.rotation *= -1.0; }},
-      {"far away", [](Setpoint& s) { s.mode = Mode::kCartesian, s.tip_pose.position.x() = 1e7; }},
-      {"pose NaN", [&](Setpoint& s) { s.mode = Mode::kCartesian, s.tip_pose.position.x() = nan; }},
-      {"task gains",
-       [](Setpoint& s) { s.mode = Mode::kCartesian, s.gains.task_stiffness(2, 2) = -1; }},
-      {"null gains",
-       [](Setpoint& s) { s.mode = Mode::kCartesian, s.gains.null_damping[0] = -0.1; }},
   };
   for (const auto& [name, spoil] : spoilers) {
     SCOPED_TRACE(name);
