@@ -1,7 +1,5 @@
-// Mechanisms whose motion is known.
-#include <dashpot/tests/sim/kdl_chain.hpp>
+// A mechanism whose motion is known.
 #include <dashpot/tests/sim/scenes.hpp>
-#include <dashpot/tests/support/random.hpp>
 
 #include <gtest/gtest.h>
 
@@ -33,29 +31,6 @@ TEST(Pendulum, SwingsFarWithThePeriodOfTheEllipticIntegral) {
     EXPECT_NEAR(plant.position()[0], amplitude, 1e-9);
     EXPECT_NEAR(plant.velocity()[0], 0, 1e-9);
   }
-}
-
-/// Nothing turns the arm about its vertical first axis, so that p1 = (M qd)_1 stays; M by KDL.
-TEST(Momentum, AboutTheVerticalIsKept) {
-  const testing::ChainFile file = testing::panda_file();
-  RobotParameters parameters;
-  parameters.viscous_friction = JointVector::Zero(7);
-  Arm arm(testing::robot_of(file, parameters));
-  testing::KdlReference reference(file, {0, 0, -9.81});
-  const auto momentum = [&](const Plant& plant) {
-    const JointVector qd = plant.velocity();
-    return reference.at(plant.position(), qd).M.row(0).dot(qd);
-  };
-  Plant plant(arm, precise(0.01), joints({0, -0.7, 0.2, -2.3, 0, 1.5, 0.7}),
-              joints({1, 0.3, -0.5, 0.2, 1, -1, 2}));
-  const double start = momentum(plant);
-  EXPECT_GT(std::abs(start), 0.1);
-  const double speed = plant.velocity()[0];
-  for (int i = 0; i < 100; ++i) {
-    ASSERT_EQ(run(plant, 1), Status::kOk);
-    EXPECT_NEAR(momentum(plant), start, 1e-9);
-  }
-  EXPECT_GT(std::abs(plant.velocity()[0] - speed), 0.1);  // though the velocity is not
 }
 
 }  // namespace
