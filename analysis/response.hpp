@@ -2,7 +2,6 @@
 #include <dashpot/analysis/spectrum/spectrum_result.hpp>
 
 #include <optional>
-#include <vector>
 
 namespace dashpot::analysis {
 
@@ -48,17 +47,6 @@ class Response {
   Motion step(const Eigen::VectorXd& force, double time) const;
   /// Returns the sum of the responses to all that the cause names.
   Motion caused(const Cause& cause, double time) const;
-  /// Returns the response from rest to  cosine cos(omega t) + sine sin(omega t)  from t = 0 on,
-  /// omega in rad/s. It is exact at resonance too.
-  Motion harmonic(const Eigen::VectorXd& cosine, const Eigen::VectorXd& sine, double omega,
-                  double time) const;
-
-  /// Returns the response from (q(0), q'(0)) to a force sampled at 0, h, 2h, ... (columns of
-  /// `forces`, n x s) and linear in between (first-order hold). It is exact between samples. The
-  /// times are in rising order within [0, (s-1) h].
-  std::vector<Motion> sampled(const Eigen::VectorXd& position, const Eigen::VectorXd& velocity,
-                              const Eigen::MatrixXd& forces, double h,
-                              const std::vector<double>& times) const;
 
   /// Returns the receptance  H(omega) = (K + i omega C - omega^2 M)^-1, n x n, by modal
   /// superposition. If i omega is an eigenvalue exactly, the entries that this mode reaches are
@@ -66,7 +54,6 @@ class Response {
   Eigen::MatrixXcd receptance(double omega) const;
 
  private:
-  Eigen::VectorXd start(const Eigen::VectorXd& position, const Eigen::VectorXd& velocity) const;
   Eigen::VectorXd drive_of(const Eigen::VectorXd& force, const char* name) const;
   Eigen::MatrixXd phi_of_basis(int k, double time) const;
   Motion motion(const Eigen::VectorXd& xi) const;

@@ -17,18 +17,6 @@ struct SpectrumOptions {
   double target_bound = 1e-10;  ///< relative, no unit
 };
 
-/// State matrix A = [0 I; -M^-1 K  -M^-1 C] in the coordinates (q, q') and its dual eigenvectors
-/// (paper, Eqs. 29-31): A X = X diag(lambda), Y^T A = diag(lambda) Y^T, Y^T X = I.
-struct DualEigenvectors {
-  Eigen::VectorXcd eigenvalues;  ///< 2m, of the nonzero modes: pairs in the order of the modes
-  Eigen::MatrixXcd right;        ///< X, 2n x 2m
-  Eigen::MatrixXcd left;         ///< Y, 2n x 2m; infinite where eigenvalues are defective
-};
-
-/// Returns the dual eigenvectors of the nonzero modes, scaled so that right columns have unit
-/// length.
-DualEigenvectors dual_eigenvectors(const System<>& system, const Spectrum<>& spectrum);
-
 /// Computes spectra of systems of up to N coordinates, in storage of its own.
 template <int N = kDynamic>
 class SpectrumSolver {

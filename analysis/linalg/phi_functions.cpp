@@ -28,13 +28,13 @@ double sum_of_products(double a, double b, double c, double d) {
 /// where mean is the average of f over the two eigenvalues and slope its divided difference. Both
 /// stay smooth where the eigenvalues meet.
 struct PairFunction {
-  Complex mean;
-  Complex slope;
+  double mean;
+  double slope;
 };
 
 /// Z as the two numbers its functions depend on, and its eigenvalues.
 struct Pair {
-  Complex x;
+  double x = 0;
   double d = 0;
   Complex first;  ///< x + sqrt(d)
   Complex second;
@@ -43,12 +43,12 @@ struct Pair {
 PairFunction exponential(const Pair& z) {
   const double root = std::sqrt(std::abs(z.d));
   if (z.d < 0) {
-    const Complex scale = std::exp(z.x);
+    const double scale = std::exp(z.x);
     return {scale * std::cos(root), scale * (std::sin(root) / root)};
   }
   // cosh and sinh times e^x may overflow times underflow; the two exponentials cannot.
-  const Complex slower = std::exp(z.first);
-  return {slower * (0.5 * (1 + std::exp(-2 * root))), slower * phi(1, -2 * root)};
+  const double slower = std::exp(z.first.real());
+  return {slower * (0.5 * (1 + std::exp(-2 * root))), slower * phi(1, -2 * root).real()};
 }
 
 /// Horner's rule with numbers a + b N, N^2 = d.
@@ -71,29 +71,26 @@ PairFunction pair_function(int k, const Pair& z) {
   if (std::abs(gap) > 0.2 * size) {
     const Complex first = phi(k, z.first);
     const Complex second = phi(k, z.second);
-    return {0.5 * (first + second), (first - second) / gap};
+    return {0.5 * (first + second).real(), ((first - second) / gap).real()};
   }
-  // phi_k = Z^-1 (phi_{k-1} - phi_{k-1}(0)), with Z^-1 = (x - N) / (x^2 - d): well conditioned
-  // here.
-  const PairFunction previous = pair_function(k - 1, z);
-  const Complex p = previous.mean - reciprocal_factorial(k - 1);
-  const Complex q = previous.slope;
-  const Complex determinant = z.first * z.second;
+  // phi_1 = Z^-1 (phi_0 - I), with Z^-1 = (x - N) / (x^2 - d): well conditioned here.
+  const PairFunction previous = exponential(z);
+  const double p = previous.mean - 1;
+  const double q = previous.slope;
+  const double determinant = (z.first * z.second).real();
   return {(p * z.x - q * z.d) / determinant, (q * z.x - p) / determinant};
 }
 
-Eigen::Matrix2cd phi_two(int k, const Eigen::Matrix2d& A, double t, double omega) {
+Eigen::Matrix2d phi_two(int k, const Eigen::Matrix2d& A, double t) {
   const EigenvaluePair values = eigenvalue_pair(A);
-  const Complex shift(0, omega);
-  Pair z{(values.mean - shift) * t, values.discriminant * t * t, (values.first - shift) * t,
-         (values.second - shift) * t};
+  Pair z{values.mean * t, values.discriminant * t * t, values.first * t, values.second * t};
   if (t < 0) std::swap(z.first, z.second);
   const PairFunction f = pair_function(k, z);
 
-  Eigen::Matrix2cd result;
+  Eigen::Matrix2d result;
   if (A(1, 0) == 0) {  // a zero mode: both eigenvalues are on the diagonal
-    result << phi(k, (A(0, 0) - shift) * t), f.slope * (A(0, 1) * t),  //
-        0, phi(k, (A(1, 1) - shift) * t);
+    result << phi(k, A(0, 0) * t).real(), f.slope * (A(0, 1) * t),  //
+        0, phi(k, A(1, 1) * t).real();
     return result;
   }
   const double half_difference = 0.5 * (A(0, 0) - A(1, 1));
@@ -103,25 +100,24 @@ Eigen::Matrix2cd phi_two(int k, const Eigen::Matrix2d& A, double t, double omega
 }
 
 /// Z e^x, without a product of zero and infinity where e^x leaves the range of numbers.
-void scale_by_exponential(double x, Eigen::MatrixXcd& Z) {
+void scale_by_exponential(double x, Eigen::MatrixXd& Z) {
   const double half = std::exp(0.5 * x);
-  const auto scaled = [half](double entry) { return entry == 0 ? 0 : half * entry * half; };
-  for (Complex& entry : Z.reshaped()) entry = {scaled(entry.real()), scaled(entry.imag())};
+  for (double& entry : Z.reshaped()) entry = entry == 0 ? 0 : half * entry * half;
 }
 
 /// e^Z by scaling and squaring of the Taylor series. The mean eigenvalue is taken out first, which
 /// leaves little to square where the eigenvalues lie close together, as they do in large blocks.
 /// What the squares of a wide block grow by is taken out as well, before it is too large.
-Eigen::MatrixXcd matrix_exponential(const Eigen::MatrixXcd& Z) {
-  const auto identity = Eigen::MatrixXcd::Identity(Z.rows(), Z.cols());
-  const Complex mean = Z.trace() / static_cast<double>(Z.rows());
-  Eigen::MatrixXcd scaled = Z - mean * identity;
+Eigen::MatrixXd matrix_exponential(const Eigen::MatrixXd& Z) {
+  const auto identity = Eigen::MatrixXd::Identity(Z.rows(), Z.cols());
+  const double mean = Z.trace() / static_cast<double>(Z.rows());
+  Eigen::MatrixXd scaled = Z - mean * identity;
   const double norm = scaled.cwiseAbs().colwise().sum().maxCoeff();
   const int squarings = norm < 1 ? 0 : std::ilogb(norm) + 1;
   scaled *= std::ldexp(1.0, -squarings);
 
   double coefficient = reciprocal_factorial(kTerms);
-  Eigen::MatrixXcd sum = coefficient * identity;
+  Eigen::MatrixXd sum = coefficient * identity;
   for (int j = kTerms - 1; j >= 0; --j) {
     coefficient *= j + 1;
     sum = coefficient * identity + sum * scaled;
@@ -136,22 +132,21 @@ Eigen::MatrixXcd matrix_exponential(const Eigen::MatrixXcd& Z) {
     sum *= 1 / size;
     taken_out += std::log(size);
   }
-  sum *= std::polar(1.0, mean.imag());
-  scale_by_exponential(mean.real() + taken_out, sum);
+  scale_by_exponential(mean + taken_out, sum);
   return sum;
 }
 
-Eigen::MatrixXcd phi_general(int k, const Eigen::MatrixXcd& Z) {
+Eigen::MatrixXd phi_general(int k, const Eigen::MatrixXd& Z) {
   if (k == 0) return matrix_exponential(Z);
   const Eigen::Index n = Z.rows();
-  const Eigen::MatrixXcd inverse = Z.partialPivLu().inverse();
+  const Eigen::MatrixXd inverse = Z.partialPivLu().inverse();
   if (inverse.cwiseAbs().colwise().sum().maxCoeff() <= 1) {  // false if it is not finite
-    return inverse * (phi_general(k - 1, Z) - Eigen::MatrixXcd::Identity(n, n));  // 0! = 1! = 1
+    return inverse * (matrix_exponential(Z) - Eigen::MatrixXd::Identity(n, n));
   }
-  // exp([Z I 0; 0 0 I; 0 0 0]) = [phi_0 phi_1 phi_2; ...]
-  Eigen::MatrixXcd augmented = Eigen::MatrixXcd::Zero((k + 1) * n, (k + 1) * n);
+  // exp([Z I; 0 0]) = [phi_0 phi_1; 0 I]
+  Eigen::MatrixXd augmented = Eigen::MatrixXd::Zero(2 * n, 2 * n);
   augmented.topLeftCorner(n, n) = Z;
-  augmented.topRightCorner(k * n, k * n).setIdentity();
+  augmented.topRightCorner(n, n).setIdentity();
   return matrix_exponential(augmented).topRightCorner(n, n);
 }
 
@@ -159,7 +154,7 @@ Eigen::MatrixXcd phi_general(int k, const Eigen::MatrixXcd& Z) {
 
 Complex phi(int k, Complex z) {
   if (k == 0) return std::exp(z);
-  if (std::abs(z) >= 1) return (phi(k - 1, z) - 1.0) / z;  // 0! = 1! = 1
+  if (std::abs(z) >= 1) return (std::exp(z) - 1.0) / z;
   double coefficient = reciprocal_factorial(k + kTerms);
   Complex sum = coefficient;
   for (int j = kTerms - 1; j >= 0; --j) {
@@ -169,14 +164,10 @@ Complex phi(int k, Complex z) {
   return sum;
 }
 
-Eigen::MatrixXcd phi(int k, const Eigen::MatrixXd& A, double t, double omega) {
-  const Complex shift(0, omega);
-  if (A.rows() == 1) {
-    return Eigen::MatrixXcd::Constant(1, 1, phi(k, (A(0, 0) - shift) * t));
-  }
-  if (A.rows() == 2) return phi_two(k, A, t, omega);
-  const auto identity = Eigen::MatrixXcd::Identity(A.rows(), A.cols());
-  return phi_general(k, (A - shift * identity) * t);
+Eigen::MatrixXd phi(int k, const Eigen::MatrixXd& A, double t) {
+  if (A.rows() == 1) return Eigen::MatrixXd::Constant(1, 1, phi(k, A(0, 0) * t).real());
+  if (A.rows() == 2) return phi_two(k, A, t);
+  return phi_general(k, A * t);
 }
 
 EigenvaluePair eigenvalue_pair(const Eigen::Matrix2d& A) {

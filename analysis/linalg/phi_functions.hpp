@@ -3,22 +3,21 @@
 
 namespace dashpot::analysis {
 
-/// Returns phi_k(z), the functions that make up every response of a linear system, for k = 0, 1, 2:
-///     phi_0(z) = e^z,   phi_1(z) = (e^z - 1) / z,   phi_2(z) = (e^z - 1 - z) / z^2,
-/// without the cancellation of these formulas near z = 0, where phi_k(0) = 1/k!.
+/// Returns phi_k(z), the functions that make up every response of a linear system, for k = 0, 1:
+///     phi_0(z) = e^z,   phi_1(z) = (e^z - 1) / z,
+/// without the cancellation of the latter near z = 0, where phi_1(0) = 1.
 ///
-/// With them, the solution of x' = A x + g0 + g1 s for s in [0, t] and x(0) = x0 is
-///     x(t) = phi_0(A t) x0 + t phi_1(A t) g0 + t^2 phi_2(A t) g1.
+/// With them, the solution of x' = A x + g for a constant g and x(0) = x0 is
+///     x(t) = phi_0(A t) x0 + t phi_1(A t) g.
 Complex phi(int k, Complex z);
 
-/// Returns phi_k((A - i omega I) t) for one diagonal block A (1/s) of a modal basis, t in s, omega
-/// in rad/s.
+/// Returns phi_k(A t) for one diagonal block A (1/s) of a modal basis, t in s.
 ///
 /// For one row or two, the rounding errors relative to the size of the result are the errors of the
 /// rounded eigenvalues times t, from |A t| = 1e-12 to 1e6 and beyond, because nothing is squared
 /// repeatedly. The eigenvalues of a 2 x 2 block may be a complex pair, two real ones or a double
 /// one, and one of them may be zero. Larger blocks go through a matrix exponential.
-Eigen::MatrixXcd phi(int k, const Eigen::MatrixXd& A, double t, double omega = 0);
+Eigen::MatrixXd phi(int k, const Eigen::MatrixXd& A, double t);
 
 /// Eigenvalues mean +- sqrt(discriminant) of a real 2 x 2 matrix. Each has working precision
 /// wherever the entries determine it so well.

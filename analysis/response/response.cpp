@@ -4,7 +4,6 @@
 #include <dashpot/analysis/response.hpp>
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -14,7 +13,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
-using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
 void require_vector(const VectorXd& vector, Index n, const std::string& name) {
@@ -87,7 +85,9 @@ Response::Response(const System<>& system, const Spectrum<>& spectrum)
 
 Motion Response::free(const VectorXd& position, const VectorXd& velocity, double time) const {
   require("Response", std::isfinite(time), "time is not a finite number");
-  const VectorXd xi = start(position, velocity);
+  require_vector(position, mass_.rows(), "position");
+  require_vector(velocity, mass_.rows(), "velocity");
+  const VectorXd xi = coordinates(basis_, mass_, damping_, position, velocity);
   return time == 0 ? motion(position, velocity) : motion(phi_of_basis(0, time) * xi);
 }
 
@@ -120,65 +120,6 @@ Motion Response::caused(const Cause& cause, double time) const {
   return sum;
 }
 
-Motion Response::harmonic(const VectorXd& cosine, const VectorXd& sine, double omega,
-                          double time) const {
-  require_forced_time(time);
-  require("Response", std::isfinite(omega), "omega is not a finite number");
-  const VectorXd real_drive = drive_of(cosine, "cosine");
-  const VectorXd imaginary_drive = -drive_of(sine, "sine");
-  // The force is Re((cosine - i sine) e^(i omega t)). With xi = Re(e^(i omega t) eta), eta answers
-  // the constant drive in the blocks Lambda - i omega: at resonance phi_1 is simply 1.
-  const Complex rotation = time * std::polar(1.0, omega * time);
-  VectorXd xi(basis_.U.cols());
-  for (const Block& block : basis_.blocks) {
-    const VectorXcd drive = real_drive.segment(block.first, block.size) +
-                            Complex(0, 1) * imaginary_drive.segment(block.first, block.size);
-    const MatrixXcd integral = phi(1, part(basis_.Lambda, block), time, omega);
-    xi.segment(block.first, block.size) = (rotation * (integral * drive)).real();
-  }
-  return motion(xi);
-}
-
-std::vector<Motion> Response::sampled(const VectorXd& position, const VectorXd& velocity,
-                                      const MatrixXd& forces, double h,
-                                      const std::vector<double>& times) const {
-  require("Response", std::isfinite(h) && h > 0, "the sampling interval is not a positive number");
-  require("Response", forces.cols() > 0, "there are no force samples");
-  const Index last = forces.cols() - 1;
-  const double end = static_cast<double>(last) * h * (1 + 4 * kEps);
-
-  VectorXd xi = start(position, velocity);  // at k h
-  VectorXd drive_now = drive_of(forces.col(0), "forces");
-  VectorXd drive_next = drive_of(forces.col(std::min<Index>(1, last)), "forces");
-  const auto after = [&](double s, const MatrixXd& phi_0, const MatrixXd& phi_1,
-                         const MatrixXd& phi_2) -> VectorXd {
-    return phi_0 * xi + s * (phi_1 * drive_now) + (s * s / h) * (phi_2 * (drive_next - drive_now));
-  };
-  const MatrixXd phi_0 = phi_of_basis(0, h);
-  const MatrixXd phi_1 = phi_of_basis(1, h);
-  const MatrixXd phi_2 = phi_of_basis(2, h);
-
-  std::vector<Motion> motions;
-  motions.reserve(times.size());
-  Index k = 0;
-  double previous = 0;
-  for (const double time : times) {
-    require("Response", time >= previous && time <= end, "times do not rise within [0, (s-1) h]");
-    previous = time;
-    while (k + 1 < last && static_cast<double>(k + 1) * h <= time) {
-      xi = after(h, phi_0, phi_1, phi_2);
-      ++k;
-      drive_now = drive_next;
-      drive_next = drive_of(forces.col(k + 1), "forces");
-    }
-    const double s = time - static_cast<double>(k) * h;
-    motions.push_back(
-        time == 0 ? motion(position, velocity)
-                  : motion(after(s, phi_of_basis(0, s), phi_of_basis(1, s), phi_of_basis(2, s))));
-  }
-  return motions;
-}
-
 MatrixXcd Response::receptance(double omega) const {
   require("Response", std::isfinite(omega), "omega is not a finite number");
   const Index n = mass_.rows();
@@ -209,12 +150,6 @@ MatrixXcd Response::receptance(double omega) const {
   return sum;
 }
 
-VectorXd Response::start(const VectorXd& position, const VectorXd& velocity) const {
-  require_vector(position, mass_.rows(), "position");
-  require_vector(velocity, mass_.rows(), "velocity");
-  return coordinates(basis_, mass_, damping_, position, velocity);
-}
-
 VectorXd Response::drive_of(const VectorXd& force, const char* name) const {
   require_vector(force, mass_.rows(), name);
   return drive(basis_, force);
@@ -225,7 +160,7 @@ MatrixXd Response::phi_of_basis(int k, double time) const {
   MatrixXd result = MatrixXd::Zero(basis_.Lambda.rows(), basis_.Lambda.cols());
   for (const Block& block : basis_.blocks) {
     result.block(block.first, block.first, block.size, block.size) =
-        phi(k, part(basis_.Lambda, block), time).real();
+        phi(k, part(basis_.Lambda, block), time);
   }
   return result;
 }

@@ -234,32 +234,6 @@ Spectrum<> analyze(const System<>& system, const SpectrumOptions& options) {
   return spectrum;
 }
 
-DualEigenvectors dual_eigenvectors(const System<>& system, const Spectrum<>& spectrum) {
-  const Eigen::Index n = system.dof(), m = spectrum.modes.size();
-  DualEigenvectors dual;
-  dual.eigenvalues.resize(2 * m);
-  dual.right.resize(2 * n, 2 * m);
-  dual.left.resize(2 * n, 2 * m);
-  for (int i = 0; i < m; ++i) {
-    const Mode<>& mode = spectrum.modes[i];
-    for (Eigen::Index k = 0; k < 2; ++k) {
-      const auto which = static_cast<std::size_t>(k);
-      const Eigen::Index column = 2 * Eigen::Index{i} + k;
-      const Complex lambda = mode.eigenvalues[which];
-      const Eigen::VectorXcd& u = mode.shapes[which];
-      const Eigen::VectorXcd& y = mode.left_shapes[which];
-      const Eigen::VectorXcd My = system.mass.transpose() * y;
-      const Eigen::VectorXcd Cy = system.damping.transpose() * y;
-      const Complex slope = ((2.0 * lambda * My + Cy).transpose() * u).value();
-      const double norm = u.norm() * std::sqrt(1 + std::norm(lambda));
-      dual.eigenvalues[column] = lambda;
-      dual.right.col(column) << u / norm, lambda * u / norm;
-      dual.left.col(column) << (lambda * My + Cy) * (norm / slope), My * (norm / slope);
-    }
-  }
-  return dual;
-}
-
 template class SpectrumSolver<kDynamic>;
 template class SpectrumSolver<kMaxDof>;
 

@@ -1,4 +1,4 @@
-// phi_0, phi_1, phi_2 of blocks against what Arb proves, from |A t| = 1e-12 to 1e6.
+// phi_0 and phi_1 of blocks against what Arb proves, from |A t| = 1e-12 to 1e6.
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/phi_functions.hpp>
 #if defined(DASHPOT_HAVE_ARB)
@@ -22,12 +22,11 @@ MatrixXd matrix2(double a, double b, double c, double d) {
   return (Matrix2d() << a, b, c, d).finished();
 }
 
-TEST(Phi, OfZeroIsOneOverFactorial) {
+TEST(Phi, OfZeroIsOne) {
   EXPECT_EQ(phi(0, 0), 1.0);
   EXPECT_EQ(phi(1, 0), 1.0);
-  EXPECT_EQ(phi(2, 0), 0.5);
-  EXPECT_TRUE(near(phi(2, MatrixXd::Zero(2, 2), 1.0), 0.5 * MatrixXd::Identity(2, 2), 0));
-  EXPECT_TRUE(near(phi(2, MatrixXd::Zero(4, 4), 1.0), 0.5 * MatrixXd::Identity(4, 4), kEps));
+  EXPECT_TRUE(near(phi(1, MatrixXd::Zero(2, 2), 1.0), MatrixXd::Identity(2, 2), 0));
+  EXPECT_TRUE(near(phi(1, MatrixXd::Zero(4, 4), 1.0), MatrixXd::Identity(4, 4), kEps));
 }
 
 TEST(Phi, OfALargeBlockWiderThanTheRangeOfNumbersIsFinite) {
@@ -42,14 +41,14 @@ TEST(Phi, OfALargeBlockWiderThanTheRangeOfNumbersIsFinite) {
     EXPECT_TRUE(near(phi(0, A, t), expected, 1e-14 * (1 + t) * std::exp(-t))) << "t = " << t;
     EXPECT_TRUE(near(phi(1, A, t) * t, -A.inverse(), 1e-4)) << "t = " << t;
   }
-  EXPECT_TRUE(near(phi(0, -A, 300.0).real().array().isNaN().cast<double>().matrix(),
-                   MatrixXd::Zero(3, 3), 0));  // too large for a number, and no worse
+  EXPECT_TRUE(near(phi(0, -A, 300.0).array().isNaN().cast<double>().matrix(), MatrixXd::Zero(3, 3),
+                   0));  // too large for a number, and no worse
 }
 
 TEST(Phi, RunsBackwardsInTime) {
   for (const MatrixXd& A : {matrix2(0, 1, -1, -2.5), matrix2(-1, 1, 0.01, -1)}) {
-    const MatrixXd there = phi(0, A, 2.0).real();
-    const MatrixXd back = phi(0, A, -2.0).real();
+    const MatrixXd there = phi(0, A, 2.0);
+    const MatrixXd back = phi(0, A, -2.0);
     EXPECT_TRUE(near(there * back, Matrix2d::Identity(), 1e-14));
   }
 }
@@ -64,31 +63,31 @@ TEST(EigenvaluePair, KeepsTheSmallRootOfAStronglyOverdampedBlock) {
 const std::vector<double> kTimes = {1e-12, 1e-8, 1e-4, 0.01, 0.3, 0.7, 1,
                                     1.5,   4,    20,   300,  1e4, 1e6};
 
-/// phi_k((A - i omega I) t): the top right block of exp([Z I 0; 0 0 I; 0 0 0]).
-Eigen::MatrixXcd reference_phi(int k, const MatrixXd& A, double t, double omega = 0) {
+/// phi_k(A t): exp(Z) or the top right block of exp([Z I; 0 0]).
+MatrixXd reference_phi(int k, const MatrixXd& A, double t) {
   constexpr slong kBits = 400;
   const Eigen::Index n = A.rows(), size = n * (k + 1);
   testing::BallMatrix Z(size, size), time(MatrixXd::Constant(1, 1, t));
   for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) acb_set_d_d(Z.at(i, j), A(i, j), i == j ? -omega : 0);
+    for (Eigen::Index j = 0; j < n; ++j) acb_set_d(Z.at(i, j), A(i, j));
   }
   acb_mat_scalar_mul_acb(Z.get(), Z.get(), time.at(0, 0), kBits);
   for (Eigen::Index i = 0; i < n * k; ++i) acb_one(Z.at(i, i + n));
   acb_mat_exp(Z.get(), Z.get(), kBits);
-  return Z.rounded().topRightCorner(n, n);
+  return Z.rounded().topRightCorner(n, n).real();
 }
 
 /// A relative change of eps in A t alone changes phi_k by eps in its rational part and eps |A t| in
 /// its exponential part. `margin` roundings are allowed.
-void expect_accurate(const MatrixXd& A, double t, double omega = 0, double margin = 16) {
-  const double size = (A - Complex(0, omega) * MatrixXd::Identity(A.rows(), A.cols())).norm() * t;
-  const double growth = reference_phi(0, A, t, omega).cwiseAbs().maxCoeff();
-  for (int k = 0; k <= 2; ++k) {
-    const Eigen::MatrixXcd reference = reference_phi(k, A, t, omega);
+void expect_accurate(const MatrixXd& A, double t, double margin = 16) {
+  const double size = A.norm() * t;
+  const double growth = reference_phi(0, A, t).cwiseAbs().maxCoeff();
+  for (const int k : {0, 1}) {
+    const MatrixXd reference = reference_phi(k, A, t);
     const double exponential_part = size * growth / std::pow(std::max(1.0, size), k);
     const double tolerance = margin * kEps * (reference.cwiseAbs().maxCoeff() + exponential_part);
-    EXPECT_TRUE(near(phi(k, A, t, omega), reference, tolerance))
-        << "k = " << k << ", t = " << t << ", omega = " << omega << ", A =\n"
+    EXPECT_TRUE(near(phi(k, A, t), reference, tolerance))
+        << "k = " << k << ", t = " << t << ", A =\n"
         << A;
   }
 }
@@ -121,13 +120,12 @@ TEST(Phi, OfAZeroModeBlockKeepsRelativeAccuracyOfEveryEntry) {
   for (const double t : kTimes) {
     for (const double a : {0.0, 1e-6, 0.5, 1.0, 40.0}) {
       const MatrixXd A = matrix2(0, 1, 0, -a);
-      for (int k = 0; k <= 2; ++k) {
-        const Eigen::MatrixXcd reference = reference_phi(k, A, t);
-        const Eigen::MatrixXcd computed = phi(k, A, t);
+      for (const int k : {0, 1}) {
+        const MatrixXd reference = reference_phi(k, A, t);
+        const MatrixXd computed = phi(k, A, t);
         for (const auto& [i, j] : {std::pair{0, 0}, {0, 1}, {1, 1}}) {
           const double slack = k == 0 ? 1 + a * t : 1;
-          EXPECT_NEAR(computed(i, j).real(), reference(i, j).real(),
-                      8 * kEps * slack * std::abs(reference(i, j)))
+          EXPECT_NEAR(computed(i, j), reference(i, j), 8 * kEps * slack * std::abs(reference(i, j)))
               << "k = " << k << ", a t = " << a * t << ", entry " << i << j;
         }
         EXPECT_EQ(computed(1, 0), 0.0);
@@ -145,21 +143,8 @@ TEST(Phi, OfALargeDefectiveBlockIsAccurate) {
   MatrixXd triple = -MatrixXd::Identity(3, 3);
   triple(0, 1) = triple(1, 2) = 1;
   for (const double t : {1e-12, 1e-4, 0.3, 1.0, 5.0, 100.0, 1e4}) {
-    expect_accurate(pair_twice, t, 0, 100);
-    expect_accurate(pair_twice, t, 1, 100);
-    expect_accurate(triple, t, 0, 100);
-  }
-}
-
-TEST(Phi, WithAShiftIsAccurateAtAndBesideResonance) {
-  for (const double t : {1e-8, 0.01, 0.5, 1.0, 3.0, 40.0, 1e3, 1e6}) {
-    for (const double omega : {0.0, 1e-9, 0.5, 1 - 1e-9, 1.0, 1 + 1e-5, 2.0, 1e3}) {
-      expect_accurate(matrix2(0, 1, -1, 0), t, omega);
-      expect_accurate(matrix2(-0.01, 1, -1, -0.01), t, omega);
-      expect_accurate(matrix2(-1, 1, 1e-9, -1), t, omega);
-      expect_accurate(matrix2(0, 1, 0, -0.3), t, omega);
-      expect_accurate(MatrixXd::Constant(1, 1, -0.7), t, omega);
-    }
+    expect_accurate(pair_twice, t, 100);
+    expect_accurate(triple, t, 100);
   }
 }
 
@@ -169,7 +154,7 @@ TEST(Phi, OfRandomBlocksIsAccurate) {
     MatrixXd A = random.matrix(2, 2) - 2 * MatrixXd::Identity(2, 2);
     A -= std::max(0.0, eigenvalue_pair(A).first.real()) * MatrixXd::Identity(2, 2);
     A *= random.log_uniform(1e-3, 1e3);
-    expect_accurate(A, random.log_uniform(1e-9, 1e2), i % 2 == 0 ? 0 : random.log_uniform(0.1, 10));
+    expect_accurate(A, random.log_uniform(1e-9, 1e2));
   }
 }
 #else
