@@ -20,7 +20,6 @@ struct RegionOptions {
   /// Not below the target's ratios. By default 1, or 1.5 times the target's larger ratio if that is
   /// more.
   std::optional<double> ceiling;
-  EntryBounds bounds;  ///< on the entries of the damping matrix; none by default
   /// Returns the sampled loop in which a configuration is to work, by its number, as
   /// LoopLimit::loop has it; called on several threads at once. Empty: the loops are taken for
   /// continuous.
@@ -46,9 +45,8 @@ struct RegionSample {
 struct RegionDesign {
   Eigen::MatrixXd damping;  ///< positive semidefinite
   double level = 0;  ///< smallest ratio over all configurations, relative to its target, at most 1
-  double violation = 0;   ///< by how much a ratio exceeds the ceiling, or an entry its bounds
-                          ///< (relative): rounding, unless even no damping would be too much,
-                          ///< or a share below 1 misses lower bounds
+  double violation = 0;   ///< by how much a ratio exceeds the ceiling: rounding, unless even no
+                          ///< damping would be too much
   int worst_sample = -1;  ///< configuration with the smallest ratio
   /// Largest share found, of the matrix for continuous loops, with which every loop keeps its
   /// margin; `damping` is this share of that matrix.
@@ -70,7 +68,7 @@ struct RegionDesign {
 /// The level is found by bisection to 5e-4 with DampingFit. The searches start from the exact
 /// designs of some configurations, from their mean, and from the best matrices found so far. The
 /// search does not prove that the level is the largest. For a single configuration it maximises the
-/// smallest ratio within a structure and bounds.
+/// smallest ratio within a structure.
 ///
 /// Only the few configurations that bind are searched over: 32 at first, spread evenly. The worst
 /// ones with each result join them, until no configuration misses its level by more than 2e-4 or

@@ -66,12 +66,6 @@ enum class DampingStructure {
   kDiagonal,
 };
 
-/// Bounds on the entries of a damping matrix (k x k each), infinite ones allowed.
-struct EntryBounds {
-  Eigen::MatrixXd lower;
-  Eigen::MatrixXd upper;
-};
-
 /// One system to be damped: the damping matrix X (k x k) that is sought acts through `map`,
 ///     C = system.damping + map X map',
 /// so that map is J' (n x m) in task space and the identity in joint space.

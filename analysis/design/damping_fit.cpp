@@ -104,8 +104,8 @@ void for_each_in_parallel(std::size_t count, int threads,
 }
 
 DampingFit::DampingFit(const std::vector<DampingSample>& samples, DampingStructure structure,
-                       EntryBounds bounds, int threads)
-    : samples_(samples), bounds_(std::move(bounds)), threads_(threads) {
+                       int threads)
+    : samples_(samples), threads_(threads) {
   if (samples.empty()) throw std::invalid_argument("damping: there is no system to damp");
   const Index k = samples.front().map.cols();
   for (const DampingSample& sample : samples) {
@@ -187,34 +187,10 @@ std::vector<std::vector<DampingFit::Residual>> DampingFit::of_all(const MatrixXd
   return result;
 }
 
-void DampingFit::add_bounds(const MatrixXd& X, const VectorXd& scale,
-                            std::vector<Residual>& residuals) const {
-  if (bounds_.lower.size() == 0) return;
-  for (const auto& [i, j] : entries_) {
-    const double size = scale[i] * scale[j];
-    const double excess = X(i, j) > bounds_.upper(i, j)   ? X(i, j) - bounds_.upper(i, j)
-                          : X(i, j) < bounds_.lower(i, j) ? X(i, j) - bounds_.lower(i, j)
-                                                          : 0;
-    if (excess == 0) continue;
-    Residual residual{excess / size, MatrixXd::Zero(X.rows(), X.cols())};
-    residual.gradient(i, j) += 0.5 / size;
-    residual.gradient(j, i) += 0.5 / size;
-    residuals.push_back(std::move(residual));
-  }
-}
-
 MatrixXd DampingFit::within_structure(const MatrixXd& X) const {
   MatrixXd result = MatrixXd::Zero(X.rows(), X.cols());
   for (const auto& [i, j] : entries_) result(i, j) = result(j, i) = X(i, j);
   return result;
-}
-
-double DampingFit::excess(const MatrixXd& X) const {
-  std::vector<Residual> residuals;
-  add_bounds(X, X.diagonal().cwiseMax(1e-6 * X.diagonal().maxCoeff()).cwiseSqrt(), residuals);
-  double worst = 0;
-  for (const Residual& residual : residuals) worst = std::max(worst, std::abs(residual.value));
-  return worst;
 }
 
 FitResult DampingFit::search(const MatrixXd& start, const RatioGoal& goal) const {
@@ -226,9 +202,7 @@ FitResult DampingFit::search(const MatrixXd& start, const RatioGoal& goal) const
   // Sum of squares at `at`, its Gauss-Newton Hessian and its slope.
   const auto evaluate = [&](const Factor& at, MatrixXd& H_out, VectorXd& slope_out,
                             double& worst_out) {
-    const MatrixXd X = at.matrix();
-    auto all = of_all(X, goal);
-    add_bounds(X, at.scale, all.front());
+    const auto all = of_all(at.matrix(), goal);
     H_out.setZero(count, count);
     slope_out.setZero(count);
     double total = worst_out = 0;

@@ -20,8 +20,7 @@ struct RatioGoal {
 /// Result of a search.
 struct FitResult {
   Eigen::MatrixXd damping;  ///< X, positive semidefinite by construction, in the structure
-  double violation = 0;     ///< largest distance of a ratio, or relative distance of an entry, from
-                            ///< what the goal and the bounds allow
+  double violation = 0;     ///< largest distance of a ratio from what the goal allows
 };
 
 /// Searches damping matrices of a structure by the exact sensitivities of the ratios, over one
@@ -40,7 +39,7 @@ class DampingFit {
   /// Keeps references: the samples have to outlive this object. `threads` 0: one for each
   /// processor. Throws std::invalid_argument for a search that `fits` says no to.
   DampingFit(const std::vector<DampingSample>& samples, DampingStructure structure,
-             EntryBounds bounds = {}, int threads = 1);
+             int threads = 1);
 
   /// Returns true if a search over so many systems of `dof` coordinates and `directions` takes at
   /// most about 1 GB: for the gradients of all ratios and for the Hessian.
@@ -54,10 +53,6 @@ class DampingFit {
   /// Returns X with zeros outside the structure, which is still positive semidefinite.
   Eigen::MatrixXd within_structure(const Eigen::MatrixXd& X) const;
 
-  /// Returns by how much an entry of X exceeds its bounds, relative to the square roots of its two
-  /// diagonal entries.
-  double excess(const Eigen::MatrixXd& X) const;
-
  private:
   struct Residual {
     double value = 0;
@@ -68,11 +63,8 @@ class DampingFit {
   std::vector<Residual> of_sample(const DampingSample& sample, const Eigen::MatrixXd& X,
                                   const RatioGoal& goal) const;
   std::vector<std::vector<Residual>> of_all(const Eigen::MatrixXd& X, const RatioGoal& goal) const;
-  void add_bounds(const Eigen::MatrixXd& X, const Eigen::VectorXd& scale,
-                  std::vector<Residual>& residuals) const;
 
   const std::vector<DampingSample>& samples_;
-  EntryBounds bounds_;
   Entries entries_;  // of R
   int threads_;
 };

@@ -54,12 +54,11 @@ std::vector<RegionSample> read_all(const std::vector<DampingSample>& samples,
 /// What all configurations say of one damping matrix.
 using Judge = std::function<RegionVerdict(const MatrixXd&)>;
 
-RegionDesign design_of(const MatrixXd& damping, const RegionVerdict& verdict, const DampingFit& fit,
-                       double ceiling) {
+RegionDesign design_of(const MatrixXd& damping, const RegionVerdict& verdict, double ceiling) {
   RegionDesign design;
   design.damping = damping;
   design.level = std::min(1.0, verdict.level);
-  design.violation = std::max({0.0, verdict.largest_ratio - ceiling, fit.excess(damping)});
+  design.violation = std::max(0.0, verdict.largest_ratio - ceiling);
   design.worst_sample = static_cast<int>(verdict.worst_sample);
   design.gain_margin = verdict.gain_margin;
   design.margin_sample = static_cast<int>(verdict.margin_sample);
@@ -93,7 +92,7 @@ void offer(MatrixXd damping, const Judge& judge, const DampingFit& fit, double c
   damping = fit.within_structure(damping);
   for (int k = 0; k < kScalings; ++k) {
     const RegionVerdict verdict = judge(damping);
-    const RegionDesign design = design_of(damping, verdict, fit, ceiling);
+    const RegionDesign design = design_of(damping, verdict, ceiling);
     if (design.violation <= kLevelMet) {
       if (design.level > best.level) best = {damping, design.level};
       return;
@@ -109,7 +108,7 @@ Candidate search_level(const std::vector<TaskImpedance>& configurations, const M
                        const std::function<void(double)>& tell) {
   const double ceiling = ceiling_of(options);
   const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
-  const DampingFit fit(samples, options.structure, options.bounds, options.threads);
+  const DampingFit fit(samples, options.structure, options.threads);
   const Judge judge = [&](const MatrixXd& damping) {
     const RegionQuestion question{damping, options.target, 0, 0, {}};
     return verdict_of(read_all(samples, question, options), 0, question);
@@ -196,7 +195,7 @@ Lowered search_region(const RegionSource& source, const RegionOptions& options) 
           "a region of " + std::to_string(source.count) + " configurations of " +
               std::to_string(n) + " coordinates and " + std::to_string(k) +
               " directions would take more than 1 GB");
-  const DampingFit fit(one, options.structure, options.bounds, options.threads);  // for the limits
+  const DampingFit fit(one, options.structure, options.threads);  // for the structure
   std::vector<TaskImpedance> chosen;
   Candidate candidate{MatrixXd(), 1}, best;
   RegionDesign design;
@@ -208,7 +207,7 @@ Lowered search_region(const RegionSource& source, const RegionOptions& options) 
                              [&](double done) { tell(0.9 * (round + done) / (round + 1.0)); });
     const RegionVerdict verdict =
         source.judge({candidate.damping, options.target, candidate.level, ceiling, members});
-    design = design_of(candidate.damping, verdict, fit, ceiling);
+    design = design_of(candidate.damping, verdict, ceiling);
     if (design.violation <= kLevelMet && design.level > best.level) {
       best = {design.damping, design.level};
     }
@@ -228,12 +227,10 @@ Lowered search_region(const RegionSource& source, const RegionOptions& options) 
   return result;
 }
 
-/// The design with the matrix of `found`; `one` is any of the configurations.
-RegionDesign design_of(const Lowered& found, const RegionVerdict& verdict, const DampingSample& one,
+/// The design with the matrix of `found`.
+RegionDesign design_of(const Lowered& found, const RegionVerdict& verdict,
                        const RegionOptions& options) {
-  const std::vector<DampingSample> samples = {one};
-  const DampingFit fit(samples, options.structure, options.bounds);
-  RegionDesign design = design_of(found.damping, verdict, fit, ceiling_of(options));
+  RegionDesign design = design_of(found.damping, verdict, ceiling_of(options));
   design.share = found.share.level;
   design.kept =
       found.share.kept && design.gain_margin >= (1 - kMarginPrecision) * options.gain_margin;
@@ -252,7 +249,7 @@ RegionDesign evaluate(const std::vector<TaskImpedance>& configurations, const Lo
   const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
   const RegionQuestion question = last_question(found.damping, options);
   std::vector<RegionSample> map = read_all(samples, question, options);
-  RegionDesign design = design_of(found, verdict_of(map, 0, question), samples[0], options);
+  RegionDesign design = design_of(found, verdict_of(map, 0, question), options);
   design.samples = std::move(map);
   return design;
 }
@@ -262,7 +259,7 @@ RegionDesign evaluate(const std::vector<TaskImpedance>& configurations, const Lo
 RegionDesign design_region(const RegionSource& source, const RegionOptions& options) {
   const Lowered found = search_region(source, options);
   const RegionVerdict verdict = source.judge(last_question(found.damping, options));
-  return design_of(found, verdict, damping_sample(source.configuration(0)), options);
+  return design_of(found, verdict, options);
 }
 
 RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
