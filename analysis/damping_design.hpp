@@ -69,7 +69,7 @@ struct DampingDesign {
 DampingDesign design_damping(const TaskImpedance& impedance, const DampingTarget& target);
 
 /// Designs a damping matrix whose entries outside `structure` are zero, or one near `start` (a
-/// positive semidefinite matrix that the user likes), or both. A search along the sensitivities
+/// positive semidefinite matrix that the user likes), or both. A search along the derivatives
 /// (DampingFit) does this, because there is no closed form. It starts from `start`, or from the
 /// part of the exact answer inside the structure, and ends at a solution near its start. If it
 /// finds none, `misses` names the modes. With a `start` the sum of the squared differences of

@@ -14,7 +14,7 @@ struct TrackedShapes {
   /// damping both are the only eigenvector. Zero if the eigenvalue is exactly zero: it belongs to
   /// an elastic coordinate that no motion changes.
   std::array<ComplexVector<kMaxDof>, 2> u;
-  /// u' (2 lambda M + C) u (no conjugation), 1/s: the scale of dual vectors and of sensitivities;
+  /// u' (2 lambda M + C) u (no conjugation), 1/s: the scale of left eigenvectors;
   /// zero at critical damping, and where coefficients are not symmetric
   std::array<Complex, 2> slope{};
 };

@@ -1,5 +1,5 @@
 #include <dashpot/analysis/design/damping_fit.hpp>
-#include <dashpot/analysis/sensitivity.hpp>
+#include <dashpot/analysis/response/damping_gradients.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 
 #include <Eigen/Cholesky>
@@ -25,7 +25,7 @@ constexpr double kSolved = 1e-12;
 /// A search ends when so many steps together gain less than this part of the sum of squares.
 constexpr int kPatience = 6;
 constexpr double kLittle = 1e-3;
-/// Most bytes of a search, and the parts of them: of all gradients, of one system's sensitivities
+/// Most bytes of a search, and the parts of them: of all gradients, of one system's
 /// for several threads, and of three Hessians.
 constexpr double kMostBytes = 8e8;
 

@@ -23,7 +23,7 @@ struct FitResult {
   double violation = 0;     ///< largest distance of a ratio from what the goal allows
 };
 
-/// Searches damping matrices of a structure by the exact sensitivities of the ratios, over one
+/// Searches damping matrices of a structure by the exact derivatives of the ratios, over one
 /// system or many at a time.
 ///
 /// X = S R R' S, with S the diagonal of the start's square-rooted entries and R lower triangular

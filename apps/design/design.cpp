@@ -124,12 +124,8 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
   report.after = make_report(plain, after, spectrum, largest);
   report.gears = entry.loop.gears.any();
   if (report.gears) {
-    if (options.sensitivity) throw InputError("--sensitivity", "does not go with elastic gears");
     report.notes.emplace_back(
         "the damping is designed for rigid gears; the modes include the elastic gears");
-  }
-  if (options.sensitivity) {
-    report.sensitivities = analysis::sensitivities(report.design.system, report.after.spectrum);
   }
   if (const auto& given = entry.impedance.task_damping) {
     const Eigen::VectorXd negative = analysis::negative_eigenvalues(*given);

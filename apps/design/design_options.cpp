@@ -109,8 +109,6 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
                   "Give up the ratio of modes below this many rad/s")
       ->transform(positive("rad/s", "a frequency in rad/s"))
       ->option_text("W (0.001)");
-  command.add_flag("--sensitivity", options.sensitivity,
-                   "How frequencies and ratios answer to the entries of the matrices");
   command.add_flag("--json", options.json, "Print JSON instead of a table");
 }
 
@@ -140,7 +138,6 @@ void check(const DesignOptions& options) {
   const std::string not_with =
       options.region ? "does not go with --region" : "does not go with --contact";
   if (options.near && many) throw InputError("--near", not_with);
-  if (options.sensitivity && many) throw InputError("--sensitivity", not_with);
   if (options.largest_ratio && !many) {
     throw InputError("--largest-ratio", "needs --region");
   }

@@ -25,7 +25,6 @@ struct DesignOptions {
   std::string direction;  ///< of the contact; all if empty
   bool near = false;
   bool region = false;
-  bool sensitivity = false;
   bool json = false;
 
   analysis::DampingStructure damping_structure() const;

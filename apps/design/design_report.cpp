@@ -73,7 +73,6 @@ Json to_value(const DesignReport& report) {
   if (!report.rotors.empty()) result["rotors"] = report.rotors;
   if (!report.drives.empty()) result["drives"] = drives_json(report.drives);
   if (report.loop) result["loop"] = to_value(*report.loop);
-  if (!report.sensitivities.empty()) result["sensitivity"] = sensitivity_json(report);
   return result;
 }
 
@@ -330,7 +329,6 @@ std::string design_table(const std::vector<DesignReport>& reports, bool as_list)
     }
     text += miss_text(report);
     if (!report.after.spectrum.modes.empty()) text += "\n" + mode_table(report);
-    if (!report.sensitivities.empty()) text += sensitivity_text(report);
   }
   return text;
 }

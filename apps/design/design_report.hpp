@@ -1,7 +1,6 @@
 #pragma once
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/analysis/damping_sampled.hpp>
-#include <dashpot/analysis/sensitivity.hpp>
 #include <dashpot/apps/report/system_report.hpp>
 
 #include <optional>
@@ -26,7 +25,6 @@ struct DesignReport {
   analysis::DampingDesign design;
   Report before;  ///< with the damping that the file gives
   Report after;
-  std::vector<analysis::ModeSensitivity> sensitivities;  ///< of `after`; none if not asked for
   std::optional<LoopReport> loop;  ///< none if the loop is taken for continuous
   std::vector<std::string> notes, assumes;
   std::optional<Eigen::VectorXd> q;  ///< of an arm, rad or m
@@ -64,14 +62,5 @@ std::string region_table(const RegionReport& report);
 std::string region_complaint(const RegionReport& report);
 /// The map of the worst mode: a line of headings, then one for each configuration.
 std::string region_csv(const RegionReport& report);
-
-/// The gradients of frequencies and ratios, one object for each mode: by the entries of M, C and K;
-/// by C_C and K_C if there is a jacobian; by a point mass at its origin (`payload`, per kg) if it
-/// has six rows; and by each joint's inertia and friction.
-Json sensitivity_json(const DesignReport& report);
-
-/// Writes them for people: percent by one percent of diagonal entries, by 1 kg of payload, and by
-/// inertia and friction in the joints.
-std::string sensitivity_text(const DesignReport& report);
 
 }  // namespace dashpot::apps

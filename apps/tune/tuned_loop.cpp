@@ -1,4 +1,3 @@
-#include <dashpot/analysis/sensitivity.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/tune/place_motion.hpp>
@@ -48,22 +47,6 @@ MatrixXd of_controller(const analysis::Gears& gears, const MatrixXd& A) {
     for (Eigen::Index i = 0; i < n; ++i) block(i, j) = A(gears.motor(i), gears.measured(j));
   }
   return block;
-}
-
-/// d ratio / d entry of the controller's stiffness and damping, one matrix for each mode.
-Json sensitivity_json(const analysis::System<>& system, const analysis::Spectrum<>& spectrum,
-                      const analysis::Gears& gears, const MatrixXd* J) {
-  Json of_stiffness = Json::array(), of_damping = Json::array();
-  for (const analysis::ModeSensitivity& mode : analysis::sensitivities(system, spectrum)) {
-    const auto rows = [&](const MatrixXd& all) {
-      MatrixXd G = of_controller(gears, all);
-      G = (0.5 * (G + G.transpose())).eval();  // an entry moves together with its mirror image
-      return json_rows(J != nullptr ? analysis::task_gradient(*J, G) : G);
-    };
-    of_stiffness.push_back(rows(mode.stiffness.damping_ratio));
-    of_damping.push_back(rows(mode.damping.damping_ratio));
-  }
-  return {{"stiffness", of_stiffness}, {"damping", of_damping}};
 }
 
 /// The motion that becomes unstable first when the gains grow: with gains just beyond the margin
@@ -311,7 +294,6 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
                  {"limit", nullptr},
                  {"release", release_json(response, loop.spectrum, motion, row)},
                  {"frequency", receptance_json(loop.system, loop.spectrum, row, moved.unit)},
-                 {"sensitivity", nullptr},
                  {"system", system_json(loop.system, loop.parts, rigid)},
                  {"gains", gains_json(loop.parts, friction)}};
   if (loop.level) {
@@ -323,10 +305,6 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
   const bool task = design_.stated.mode == Mode::kCartesian;
   if (task && design_.designed() && !controller::lost_directions(model, q).empty()) {
     result["gains"]["damping"] = nullptr;  // it fits this posture only
-  }
-  if (!design_.stated.inertia_blocks) {
-    result["sensitivity"] = sensitivity_json(loop.system, loop.spectrum, gears_,
-                                             task ? &*loop.parts.jacobian : nullptr);
   }
   return result;
 }

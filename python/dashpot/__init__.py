@@ -12,8 +12,7 @@ from ._arch import load_core as _load_core
 __build__ = _load_core()  # for which processors the code in use was compiled
 
 from ._analysis import (  # isort: skip
-    DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities, design_damping, modes, receptance, response,
-    sampled_modes, sensitivities)
+    DampingDesign, Miss, Response, SampledModes, design_damping, modes, receptance, response, sampled_modes)
 from ._audit import Audit, Contact, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit, audit, contact
 from ._controller import Controller, Setpoint, Snapshot, Status, TrackedModes, TrackedSampledModes
 from ._core import Error
@@ -25,9 +24,9 @@ from ._robot import ClosedLoop, Robot, closed_loop, published_drives
 
 __version__ = _version("dashpot")
 __all__ = ["Audit", "ClosedLoop", "Contact", "Controller", "DampingDesign", "DampingSuggestion",
-           "Distribution", "Error", "Gradients", "Identification", "Log", "LoggedMode",
+           "Distribution", "Error", "Identification", "Log", "LoggedMode",
            "MeasuredModes", "Miss", "Modes",
-           "PostureAudit", "RegionDesign", "Response", "Robot", "SampledModes", "Sensitivities",
+           "PostureAudit", "RegionDesign", "Response", "Robot", "SampledModes",
            "Setpoint", "Snapshot", "Status", "TrackedModes", "TrackedSampledModes",
            "WorkspaceAudit", "audit", "closed_loop", "contact", "design_damping", "design_region", "identify",
-           "modes", "published_drives", "read_log", "receptance", "response", "sampled_modes", "sensitivities"]
+           "modes", "published_drives", "read_log", "receptance", "response", "sampled_modes"]

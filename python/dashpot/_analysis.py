@@ -1,4 +1,4 @@
-"""Systems given by matrices: modes, responses, sensitivities, the sampled loop, damping design."""
+"""Systems given by matrices: modes, responses, the sampled loop, damping design."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._results import Array, ComplexArray, Modes, Result, TextArray, make_modes, stack, to_matrix, to_numbers, to_vector
+from ._results import Array, ComplexArray, Modes, Result, TextArray, make_modes, to_matrix, to_numbers, to_vector
 
 
 def _impedance(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
@@ -88,48 +88,6 @@ def receptance(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | Non
     system, at = _impedance(M, C, K, None, None, None), np.asarray(omega, dtype=np.float64)
     each = [_core.receptance(system, one) for one in at.ravel().tolist()]
     return np.asarray(each).reshape(at.shape + np.shape(each[0]) if each else (0, 0, 0))
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Gradients(Result):
-    """Derivatives of m modes by the entries of one coefficient A: G[i] changes mode i by
-    sum(G[i] * dA)."""
-
-    natural_frequency: Array
-    """m x n x n, rad/s for each unit of A."""
-    damping_ratio: Array
-    """m x n x n."""
-    eigenvalues: ComplexArray
-    """m x 2 x n x n, 1/s; infinite or NaN at critical damping."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Sensitivities(Result):
-    """Exact first-order sensitivities of modes."""
-
-    modes: Modes
-    mass: Gradients
-    damping: Gradients
-    stiffness: Gradients
-    regular: npt.NDArray[np.bool_]
-    """m; False where another mode is so near that gradients hold only for smaller changes."""
-
-
-def sensitivities(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None
-                  ) -> Sensitivities:
-    """Returns how frequency, ratio and eigenvalues of each mode change with the entries of M, C and
-    K. Raises Error as `modes` does."""
-    found = _core.sensitivities(_impedance(M, C, K, None, None, None))
-    n = len(np.atleast_1d(np.asarray(M)))
-
-    def gradients(coefficient: str) -> Gradients:
-        given = found[coefficient]
-        return Gradients(stack(given["natural_frequency"], (n, n)),
-                         stack(given["damping_ratio"], (n, n)),
-                         stack(given["eigenvalues"], (2, n, n), complex))
-
-    return Sensitivities(make_modes(found["modes"]), gradients("mass"), gradients("damping"),
-                         gradients("stiffness"), np.array(found["regular"], dtype=bool))
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -1,15 +1,12 @@
-// Modes, responses, sensitivities, and the sampled loop, of a system given by matrices.
+// Modes, responses, and the sampled loop, of a system given by matrices.
 
 #include <dashpot/analysis/response.hpp>
-#include <dashpot/analysis/sensitivity.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/python/src/analysis.hpp>
 
 namespace dashpot::python {
 
 using analysis::Mode;
-using analysis::ModeGradient;
-using analysis::ModeSensitivity;
 using analysis::Motion;
 using analysis::SampledLoop;
 using analysis::SampledMode;
@@ -147,40 +144,6 @@ nb::object receptance(const TaskImpedance& impedance, double omega) {
   return nb::cast(std::move(H));
 }
 
-nb::dict gradients(const std::vector<ModeSensitivity>& modes,
-                   ModeGradient ModeSensitivity::*coefficient) {
-  nb::dict result;
-  result["natural_frequency"] = to_list(modes, [=](const ModeSensitivity& mode) {
-    return to_array((mode.*coefficient).natural_frequency);
-  });
-  result["damping_ratio"] = to_list(modes, [=](const ModeSensitivity& mode) {
-    return to_array((mode.*coefficient).damping_ratio);
-  });
-  result["eigenvalues"] = to_list(modes, [=](const ModeSensitivity& mode) {
-    const auto& two = (mode.*coefficient).eigenvalues;
-    return nb::make_tuple(to_array(two[0]), to_array(two[1]));
-  });
-  return result;
-}
-
-nb::dict find_sensitivities(const TaskImpedance& impedance) {
-  std::optional<Solved> solved;
-  std::vector<ModeSensitivity> found;
-  {
-    const nb::gil_scoped_release release;
-    solved.emplace(impedance, analysis::SpectrumOptions().soft_frequency);
-    found = analysis::sensitivities(solved->system, solved->spectrum);
-  }
-  nb::dict result;
-  result["modes"] = modes_of(solved->spectrum);
-  result["mass"] = gradients(found, &ModeSensitivity::mass);
-  result["damping"] = gradients(found, &ModeSensitivity::damping);
-  result["stiffness"] = gradients(found, &ModeSensitivity::stiffness);
-  result["regular"] =
-      to_list(found, [](const ModeSensitivity& mode) { return nb::bool_(mode.regular); });
-  return result;
-}
-
 /// `integral`: K_I of controller::integral_memory.
 SampledLoop make_loop(double period, int delay, double torque_cutoff, bool difference_velocity,
                       const OptionalMatrix& friction, const OptionalMatrix& gravity_gradient,
@@ -228,7 +191,6 @@ void add_analysis(nb::module_& m) {
         nb::arg("velocity").none(), nb::arg("impulse").none(), nb::arg("force").none(),
         nb::arg("points").none());
   m.def("receptance", &receptance, nb::arg("impedance"), nb::arg("omega"));
-  m.def("sensitivities", &find_sensitivities, nb::arg("impedance"));
   m.def("sampled_modes", &find_sampled_modes, nb::arg("impedance"), nb::arg("loop"));
 }
 

@@ -184,26 +184,6 @@ def test_shares_are_those_of_undamped_modes_where_damping_is_proportional():
         dashpot.response(M, None, K, [], initial_position=q, points=np.ones((1, 4)))
 
 
-def test_sensitivities_are_finite_differences():
-    M, C, K = random_system(7)
-    found = dashpot.sensitivities(M, C, K)
-    rng, step = np.random.default_rng(8), 1e-6
-    for name, index in (("mass", 0), ("damping", 1), ("stiffness", 2)):
-        change = rng.standard_normal((5, 5))
-        change += change.T
-        moved = []
-        for sign in (1, -1):
-            system = [M, C, K]
-            system[index] = system[index] + sign * step * change
-            moved.append(dashpot.modes(*system))
-        gradients = getattr(found, name)
-        for number in ("natural_frequency", "damping_ratio", "eigenvalues"):
-            difference = (getattr(moved[0], number) - getattr(moved[1], number)) / (2 * step)
-            product = np.sum(getattr(gradients, number) * change, axis=(-2, -1))
-            np.testing.assert_allclose(product, difference, rtol=1e-6, atol=1e-7)
-    assert found.regular.all() and len(found.modes) == 5
-
-
 def test_sampled_modes_are_those_of_the_map_from_tick_to_tick():
     m, c, k, period = 2.0, 3.0, 50.0, 0.01
     found = dashpot.sampled_modes([[m]], [[c]], [[k]], period=period)

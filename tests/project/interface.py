@@ -164,7 +164,7 @@ def json_keys(folder):
         ["analyze", system], ["inspect", *PANDA], ["inspect", *PANDA, "--drives", "panda"],
         ["audit", *gains, "--damping-factor", "2", *period, "--samples", "2", "--drives", "panda"],
         ["audit", *gains, "--damping-factor", "2", *period],
-        ["design", *gains, "--damping-ratio", "0.7", *period, "--sensitivity"],
+        ["design", *gains, "--damping-ratio", "0.7", *period],
         ["design", *gains, "--damping-ratio", "0.7", "--region", "--samples", "2"],
         ["run", SCENE, "--fast", "--duration", "0.5", "--log", log],
         ["identify", decay], ["identify", log, "--against", SCENE],

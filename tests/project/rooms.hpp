@@ -54,7 +54,7 @@ inline const std::vector<Room>& rooms() {
        {kEigen}},
       {"analysis/spectrum", 3, {"mode", "spectrum", "elastic_form"}, {kEigen}},
       {"analysis/tracker", 4, {"tracked_spectrum", "mode_tracker"}, {kEigen}},
-      {"analysis/response", 4, {"response", "sensitivity"}, {kEigen}},
+      {"analysis/response", 4, {"response"}, {kEigen}},
       {"analysis/sampled", 4, {"sampled_loop", "contact_limit"}, {kEigen}},
       {"analysis/design",
        5,

@@ -1,6 +1,6 @@
 """Walks through the task of the paper's Discussion on the page of `dashpot tune`: PROGRAM SOURCE_DIRECTORY FOLDER.
 
-Prints the ratios on the way, and writes the pictures tune.png, tune-1.png and so on of the documents to the folder.
+Prints the ratios on the way, and writes the pictures tune.png, tune-1.png and tune-2.png of the documents to the folder.
 """
 import base64
 import os
@@ -26,13 +26,10 @@ def begin(page):
     page.until(CURRENT)
 
 
-def click(page):
-    """Clicks the arrow on the diagonal of the damping that raises the smallest ratio most."""
-    page.value("""(() => { const rows = $$('#arrows_damping tr').slice(1);
-        const all = rows.map((row, i) => row.querySelectorAll('button')[i]).filter((b) => b.className == 'up');
-        const size = (b) => Number(b.textContent.slice(1).replace('−', '-'));
-        all.reduce((a, b) => size(b) > size(a) ? b : a).click(); })()""")
-    page.until(CURRENT)
+def propose(page):
+    """Clicks "Propose a diagonal" for design A."""
+    page.value("$$('#gains button').find((b) => b.textContent == 'Propose a diagonal').click()")
+    page.until('dashpot.store.state.a.damping[0] != 1 && ' + CURRENT)
 
 
 def picture(page, path, first, last, scale):
@@ -53,17 +50,11 @@ def main(program, source, folder):
             page.open(process.stdout.readline().split()[0] + '?theme=light')
             page.until(CURRENT)
             begin(page)
-            clicks = 0
-            while True:
-                found = ratios(page)
-                if clicks in (0, 20) or min(found) > 0.6:
-                    print(f'{clicks:2d} clicks:', ' '.join(f'{ratio:.3f}' for ratio in found))
-                    name = f'tune-{1 if clicks == 0 else 2 if min(found) <= 0.6 else 3}.png'
-                    picture(page, os.path.join(folder, name), 'poles', 'poles', 0.6)
-                if min(found) > 0.6:
-                    break
-                click(page)
-                clicks += 1
+            for number, what in enumerate(('C_C0 = I', 'proposed'), 1):
+                print(f'{what:8s}:', ' '.join(f'{ratio:.3f}' for ratio in ratios(page)))
+                picture(page, os.path.join(folder, f'tune-{number}.png'), 'poles', 'poles', 0.6)
+                if number == 1:
+                    propose(page)
             page.until('dashpot.workspace.found.b.postures >= 2000')
             page.value('new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))')
             picture(page, os.path.join(folder, 'tune.png'), 'arm_panel', 'table_panel', 0.55)

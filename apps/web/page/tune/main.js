@@ -16,7 +16,6 @@ import {at, Form} from './form_fields.js';
 import {gainFields, structure} from './gain_fields.js';
 import {drawMotion} from './motion.js';
 import {showRefusals} from './refusals.js';
-import {fillSensitivity} from './sensitivity.js';
 import {Tuning} from './tuning.js';
 import {drawWorkspace} from './workspace.js';
 
@@ -75,7 +74,6 @@ function makeParts(page, redraw) {
       document.body.classList.toggle('old', kDesigns.some((name) => page.old[name]));
       showRefusals(page);
       fillShapes(page);
-      fillSensitivity(page);
       fillExport(page);
     },
     workspace: () => drawWorkspace(page, workspace),
@@ -107,7 +105,7 @@ function listenToControls(page, redraw) {
     page.current = false;
     redraw.soon('texts');
   };
-  listen('change', {place: choose('place'), motion: choose('motion'), format: retell, arrow_mode: retell});
+  listen('change', {place: choose('place'), motion: choose('motion'), format: retell});
   listen('change', {preset: () => {
     const preset = setup.presets.find(({name}) => name === $('preset').value);
     if (preset) edit((state) => { Object.assign(state[state.edited], structuredClone(preset.design)); });
