@@ -53,9 +53,9 @@ struct ModelOptions {
   bool accept_inertias = false;
   /// Links whose inertias are accepted so, where not all are.
   std::vector<std::string> accept_inertias_of;
-  JointVector reflected_inertia;  ///< n, kg m^2; a URDF has none
-  /// Name of published_drives, whose reflected inertia takes the place of a missing one; empty:
-  /// none.
+  JointVector reflected_inertia;  ///< n, kg m^2, which few URDFs have
+  /// Name of published_drives, or of a drives file, whose reflected inertia takes the place of the
+  /// URDF's; empty: none.
   std::string drives;
   bool drives_friction = false;  ///< the friction of `drives` takes the place of the URDF's
   JointVector viscous_friction;  ///< n, N m s/rad

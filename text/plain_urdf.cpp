@@ -170,6 +170,13 @@ class PlainWriter {
     if (limit) complete(tag);
     text.append(tag.ends ? "/>" : ">");
     if (limit) read_limits(tag);
+    if (tag.name == "dynamics" && has(tag, "reflected_inertia")) {
+      std::array<double, 1> inertia{};
+      if (!read_numbers(value_of(tag, "reflected_inertia"), inertia)) {
+        fail("dynamics reflected_inertia: a number is wanted, kg m^2");
+      }
+      result_.reflected_inertia.emplace(part_name_, inertia[0]);
+    }
   }
 
   void write_attribute(std::string_view name, std::string_view value) {

@@ -22,6 +22,8 @@ struct PlainUrdf {
   /// By joint, the required values that its limit lacks: "effort", "velocity" or both, which are 0
   /// in `text`.
   std::map<std::string, std::string, std::less<>> lacks;
+  /// By joint, `reflected_inertia` of its dynamics, kg m^2 (kg), an attribute of Dashpot's own.
+  std::map<std::string, double, std::less<>> reflected_inertia;
   /// By joint, the `rpy` of its origin if an angle exceeds a turn, as degrees do.
   std::map<std::string, std::string, std::less<>> turns;
 };

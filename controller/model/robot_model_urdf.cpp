@@ -214,6 +214,10 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
       joints.back().jerk = limits->second.jerk;
     }
   }
+  for (Joint& joint : joints) {
+    const auto rotor = tree.reflected_inertia.find(joint.name);
+    if (rotor != tree.reflected_inertia.end()) joint.reflected_inertia = rotor->second;
+  }
   if (!options.drives.empty()) {
     const Drives& drives = find_drives(options.drives, static_cast<int>(joints.size()));
     const auto take = [&](const auto& figures, double Joint::*property) {

@@ -61,6 +61,7 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
     text::PlainUrdf plain = text::plain_urdf(text, name);
     model = urdf::parseURDF(plain.text);
     tree.limits = std::move(plain.limits);
+    tree.reflected_inertia = std::move(plain.reflected_inertia);
     tree.lacks = std::move(plain.lacks);
     tree.turns = std::move(plain.turns);
   } catch (const std::exception& error) {

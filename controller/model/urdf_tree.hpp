@@ -19,6 +19,7 @@ namespace dashpot::controller {
 struct UrdfTree {
   std::shared_ptr<urdf::ModelInterface> model;
   std::map<std::string, text::MotionLimits, std::less<>> limits;  ///< by joint
+  std::map<std::string, double, std::less<>> reflected_inertia;   ///< by joint, kg m^2 (kg)
   std::map<std::string, std::string, std::less<>> lacks, turns;   ///< likewise
 };
 
