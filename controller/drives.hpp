@@ -35,10 +35,15 @@ bool is_drives_file(std::string_view name) noexcept;
 
 /// Returns the drives of this name, or the drives in a file that `dashpot calibrate` writes: YAML
 /// with `reflected_inertia`, and `viscous_friction`, `coulomb_friction`, `source` and `doubt` if
-/// they are known. Throws InvalidModel, which lists the names or says what is wrong with the file.
+/// they are known, each number with or without its unit. Throws InvalidModel, which lists the names
+/// or says what is wrong with the file.
 const Drives& find_drives(std::string_view name);
 /// The same; throws unless they have n joints as well.
 const Drives& find_drives(std::string_view name, int n);
+
+/// Returns true if `name` names a drives file with friction, which replaces the URDF's unless
+/// something else is specified. Throws InvalidModel.
+bool has_own_friction(std::string_view name);
 
 /// Returns the first drives with as many joints whose name begins the name of the model, of its
 /// first joint or of its base: values of an arm of this kind. Null if there are none.

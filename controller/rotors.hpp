@@ -39,6 +39,10 @@ RobotModel with_at_least(const RobotModel& model, const JointVector& inertia);
 /// none at all. Empty if there is no such joint.
 std::string missing_rotors_text(const RobotModel& model);
 
+/// Returns the unit of a figure of the joints: `turns` of revolute ones, `slides` of prismatic
+/// ones, "N m (N)" of both.
+std::string unit_text(const RobotModel& model, const std::string& turns, const std::string& slides);
+
 /// Returns "joint5 0.02, joint6 0.012 kg m^2", without zeros, each rounded up to two digits.
 std::string inertia_text(const RobotModel& model, const JointVector& inertia);
 

@@ -84,7 +84,9 @@ RobotModel read_model(const ArmOptions& options) try {
       per_joint("--reflected-inertia", options.reflected_inertia, plain, "kg m^2", "kg");
   if (inertia) model.reflected_inertia = *inertia;
   take_gears(options.gears, plain, model);
-  model.drives_friction = options.viscous_friction == "drives";
+  if (!options.viscous_friction.empty()) {
+    model.drives_friction = options.viscous_friction == "drives";
+  }
   if (model.drives_friction && options.drives.empty()) {
     throw InputError("--viscous-friction", "drives: there are none; name them with --drives");
   }
@@ -102,7 +104,9 @@ RobotModel read_model(const ArmOptions& options) try {
 }
 
 std::string friction_note(const ArmOptions& options, const RobotModel& model) {
-  if (!options.viscous_friction.empty()) return controller::friction_text(model);
+  if (!options.viscous_friction.empty() || controller::has_own_friction(options.drives)) {
+    return controller::friction_text(model);
+  }
   controller::ModelOptions plain;
   take_accepted(options.accept_inertias, plain);
   const std::string left_out = controller::friction_text(

@@ -15,6 +15,7 @@ namespace dashpot::apps {
 void take_drives(const std::string& name, controller::ModelOptions& model) try {
   model.drives = controller::drives_name(name, std::filesystem::current_path());
   if (!name.empty()) controller::find_drives(model.drives);
+  model.drives_friction = controller::has_own_friction(model.drives);
 } catch (const controller::InvalidModel& error) {
   throw controller::InputError("--drives", error.what());
 }

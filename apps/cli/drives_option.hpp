@@ -13,8 +13,8 @@ inline constexpr const char* kDrivesHelp =
     "...; "
     "or a file of dashpot calibrate";
 
-/// Gives the model the published drives, or the drives file, of this name unless it is empty.
-/// Throws InputError with the option --drives.
+/// Gives the model the published drives, or the drives file with its friction, of this name unless
+/// it is empty. Throws InputError with the option --drives.
 void take_drives(const std::string& name, controller::ModelOptions& model);
 
 /// Adds the flag --accept-inertias to a command; `accepted` becomes "true", or the links given as

@@ -211,14 +211,15 @@ std::string rotors_text(const InspectOptions& options, const RobotModel& model) 
       for (int i = 1; i <= drives.joints; ++i) {
         table.add_column(Align::kPoint, {std::to_string(i)});
       }
-      const auto add = [&](const char* name, const auto& figures) {
+      const auto add = [&](const std::string& name, const auto& figures) {
         std::vector<std::string> row = {name};
         const std::vector<std::string> rest = numbers(drives.values(figures));
         row.insert(row.end(), rest.begin(), rest.end());
         table.add_row(row);
       };
-      add("viscous friction, N m s/rad", drives.viscous_friction);
-      add("Coulomb friction, N m", drives.coulomb_friction);
+      add("viscous friction, " + controller::unit_text(model, "N m s/rad", "N s/m"),
+          drives.viscous_friction);
+      add("Coulomb friction, " + controller::unit_text(model, "N m", "N"), drives.coulomb_friction);
       text += table.text();
     }
   }

@@ -99,6 +99,10 @@ void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimula
       const controller::Drives& drives =
           controller::find_drives(name, static_cast<int>(positions.size()));
       parameters.reflected_inertia = drives.values(drives.reflected_inertia);
+      if (controller::has_own_friction(name)) {
+        parameters.viscous_friction = drives.values(drives.viscous_friction);
+        parameters.coulomb_friction = drives.values(drives.coulomb_friction);
+      }
     } catch (const controller::InvalidModel& error) {
       throw keys.error("drives", error.what());
     }

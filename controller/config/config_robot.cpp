@@ -104,6 +104,7 @@ RobotModel read_drives(const text::YamlMapping& keys, const std::filesystem::pat
     throw keys.error("drives", error.what());
   }
   robot.options.drives = name;
+  if (!keys.has("drives_friction")) robot.options.drives_friction = has_own_friction(name);
   return robot.model();
 }
 

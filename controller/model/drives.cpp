@@ -1,8 +1,10 @@
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/text/printable.hpp>
+#include <dashpot/text/quantity.hpp>
 #include <dashpot/text/setting_reader.hpp>
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 
@@ -77,16 +79,18 @@ constexpr std::array kDrives = {
            "round numbers, the same for all joints; the friction is xarm_ros2's, for a simulator"},
     Drives{
         "ur3e", 6, all(0.1, 6), kNone, kNone, kMenagerieUr,
-        "not published for the UR3e, whose joints are smaller than the UR5e's; a round number, the "
-        "same for all joints; not confirmed by a record"},
+        "not confirmed by a record, and not published for the UR3e, whose joints are smaller than "
+        "the UR5e's; a round number, which is contradicted on the UR10e: see there"},
     Drives{"ur5e", 6, all(0.1, 6), kNone, kNone, kMenagerieUr,
-           "a round number, the same for all joints, not confirmed by a record; the damping there "
-           "belongs to a position servo"},
+           "not confirmed by a record; a round number, which is contradicted on the UR10e: see "
+           "there; the damping there belongs to a position servo"},
     Drives{"ur10e", 6, all(0.1, 6), kNone, kNone, kMenagerieUr,
-           "a round number, which a public record contradicts (shamilmamedov/dynamic_calibration): "
-           "0.30 to 0.42 kg m^2 in the wrists, 1.4 to 3.4 in the first three joints"},
+           "not confirmed by a record: a round number, which a public record contradicts "
+           "(shamilmamedov/dynamic_calibration), with 0.30 to 0.42 kg m^2 in the wrists, 1.4 to "
+           "3.4 in the first three joints"},
     Drives{"ur5", 6, all(0.1, 6), kNone, kNone, kMenagerieUr,
-           "of the UR5e; a round number, the same for all joints, not confirmed by a record"},
+           "not confirmed by a record; of the UR5e, and a round number, which is contradicted on "
+           "the UR10e: see there"},
 };
 
 struct FileDrives {
@@ -94,11 +98,25 @@ struct FileDrives {
   Drives drives{};
 };
 
-void read_figures(const text::YamlMapping& keys, std::string_view key, const char* unit, int joints,
-                  std::array<double, Drives::kMost>& figures) {
-  Eigen::VectorXd values = Eigen::VectorXd::Zero(joints);
-  read_numbers(keys, key, text::Units(static_cast<std::size_t>(joints), unit), text::kNotNegative,
-               values);
+bool has_unit(const std::string& quantity, const char* unit) try {
+  text::parse_quantity(quantity, unit);
+  return true;
+} catch (const std::invalid_argument&) {
+  return false;
+}
+
+/// Reads figures in the unit of revolute joints, or, where it is written, of prismatic ones.
+void read_figures(const text::YamlMapping& keys, std::string_view key, const char* turns,
+                  const char* slides, int joints, std::array<double, Drives::kMost>& figures) {
+  const text::YamlNode* const list = keys.find(key);
+  if (list == nullptr) return;
+  text::Units units(static_cast<std::size_t>(joints), turns);
+  for (std::size_t i = 0; i < std::min(units.size(), list->items.size()); ++i) {
+    const std::string& written = list->items[i].text;
+    if (!has_unit(written, turns) && has_unit(written, slides)) units[i] = slides;
+  }
+  Eigen::VectorXd values(joints);
+  read_numbers(keys, key, units, text::kNotNegative, values);
   for (int i = 0; i < joints; ++i) figures[static_cast<std::size_t>(i)] = values[i];
 }
 
@@ -115,10 +133,10 @@ void read_drives(const std::string& text, FileDrives& file) {
   }
   Drives& drives = file.drives;
   drives.joints = static_cast<int>(joints);
-  // Prismatic joints have the units of revolute ones, without rad and m.
-  read_figures(keys, "reflected_inertia", "", drives.joints, drives.reflected_inertia);
-  read_figures(keys, "viscous_friction", "", drives.joints, drives.viscous_friction);
-  read_figures(keys, "coulomb_friction", "", drives.joints, drives.coulomb_friction);
+  read_figures(keys, "reflected_inertia", "kg m^2", "kg", drives.joints, drives.reflected_inertia);
+  read_figures(keys, "viscous_friction", "N m s/rad", "N s/m", drives.joints,
+               drives.viscous_friction);
+  read_figures(keys, "coulomb_friction", "N m", "N", drives.joints, drives.coulomb_friction);
   if (keys.has("source")) read_text(keys, "source", file.source);
   if (keys.has("doubt")) read_text(keys, "doubt", file.doubt);
   drives.name = file.name;
@@ -158,6 +176,13 @@ std::string drives_name(std::string_view name, const std::filesystem::path& dire
 
 JointVector Drives::values(const std::array<double, kMost>& all_values) const {
   return Eigen::Map<const Eigen::VectorXd>(all_values.data(), joints);
+}
+
+bool has_own_friction(std::string_view name) {
+  if (!is_drives_file(name)) return false;
+  const Drives& drives = find_drives(name);
+  return !drives.values(drives.viscous_friction).isZero(0) ||
+         !drives.values(drives.coulomb_friction).isZero(0);
 }
 
 std::span<const Drives> published_drives() noexcept {

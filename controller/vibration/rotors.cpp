@@ -91,6 +91,15 @@ std::string missing_rotors_text(const RobotModel& model) {
   return "the model has no reflected inertia of " + (all ? "any joint" : names);
 }
 
+std::string unit_text(const RobotModel& model, const std::string& turns,
+                      const std::string& slides) {
+  const auto count =
+      std::count_if(model.joints().begin(), model.joints().end(),
+                    [](const Joint& joint) { return joint.type == JointType::kPrismatic; });
+  if (count == 0) return turns;
+  return count == model.dof() ? slides : turns + " (" + slides + ")";
+}
+
 std::string inertia_text(const RobotModel& model, const JointVector& inertia) {
   std::string text;
   for (int i = 0; i < model.dof(); ++i) {
@@ -98,7 +107,7 @@ std::string inertia_text(const RobotModel& model, const JointVector& inertia) {
     text += (text.empty() ? "" : ", ") + text::printable(joint_of(model, i).name) + " " +
             rounded_up(inertia[i]);
   }
-  return text + " kg m^2";
+  return text + " " + unit_text(model, "kg m^2", "kg");
 }
 
 std::string arm_without_rotors(const RobotModel& model) {
@@ -122,7 +131,7 @@ std::string friction_text(const RobotModel& model) {
   std::ostringstream text;
   text << "Viscous friction in the joints, " << friction.minCoeff();
   if (friction.maxCoeff() > friction.minCoeff()) text << " to " << friction.maxCoeff();
-  text << " N m s/rad, damps beside the gains.";
+  text << " " << unit_text(model, "N m s/rad", "N s/m") << ", damps beside the gains.";
   return text.str();
 }
 

@@ -23,7 +23,7 @@ LOADS = ("base_wrench", "tool_wrench", "joint_torques")
 
 def _options(*, gravity: npt.ArrayLike | None = None, include_off_chain: bool = True,
              accept_inertias: bool | Sequence[str] = False, drives: str = "",
-             drives_friction: bool = False, reflected_inertia: npt.ArrayLike | None = None,
+             drives_friction: bool | None = None, reflected_inertia: npt.ArrayLike | None = None,
              viscous_friction: npt.ArrayLike | None = None,
              coulomb_friction: npt.ArrayLike | None = None,
              gear_stiffness: npt.ArrayLike | None = None,
@@ -38,7 +38,9 @@ def _options(*, gravity: npt.ArrayLike | None = None, include_off_chain: bool = 
                                                    else list(accept_inertias)),
                                "position_sensor": position_sensor}
     if drives or drives_friction:
-        options["drives"], options["drives_friction"] = drives, drives_friction
+        options["drives"] = drives
+    if drives_friction is not None:
+        options["drives_friction"] = drives_friction
     if gravity is not None:
         options["gravity"] = _sized("gravity", gravity, (3,))
     for name, values in (("reflected_inertia", reflected_inertia),
@@ -131,7 +133,7 @@ class Robot:
     def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str, *,
                   gravity: npt.ArrayLike | None = None, include_off_chain: bool = True,
                   accept_inertias: bool | Sequence[str] = False, drives: str = "",
-                  drives_friction: bool = False,
+                  drives_friction: bool | None = None,
                   reflected_inertia: npt.ArrayLike | None = None,
                   viscous_friction: npt.ArrayLike | None = None,
                   coulomb_friction: npt.ArrayLike | None = None,
@@ -150,7 +152,8 @@ class Robot:
         `include_off_chain` is False. `accept_inertias` accepts physically impossible inertias
         unchanged, for all links or for the named ones.
         `drives` names public values of reflected inertia, see published_drives, or a drives file
-        of `dashpot calibrate` (.yaml); with `drives_friction` their friction replaces the URDF's.
+        of `dashpot calibrate` (.yaml). Their friction replaces the URDF's with `drives_friction`,
+        and a file's friction unless that is False.
         `reflected_inertia` (n, kg m^2), `viscous_friction` (n, N m s/rad) and `coulomb_friction`
         (n, N m) replace the values of the drives and of the URDF. Elastic gears have
         `gear_stiffness` (n, N m/rad, numpy.inf: rigid) and `gear_damping` (n, N m s/rad) between a
@@ -220,7 +223,8 @@ class Robot:
         """Returns the robot without the viscous friction of its URDF, unless `urdf_friction` is true
         or other friction is specified."""
         urdf, base, tip, file, options = self._arguments
-        stated = options.get("viscous_friction") is not None or options.get("drives_friction")
+        stated = options.get("viscous_friction") is not None or self._keys.get(
+            "drives_friction", _core.has_own_friction(options.get("drives", "")))
         if urdf_friction or stated or not self.viscous_friction.any():
             return self
         return _make_robot(urdf, base, tip, file,

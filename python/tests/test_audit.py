@@ -179,7 +179,7 @@ def test_bad_input_gives_the_programs_messages(panda, given, message):
         dashpot.audit(panda, **given)
 
 
-def test_unknown_rotors_are_said_to_be_so_with_what_would_be_enough(root, panda):
+def test_unknown_rotors_are_said_to_be_so_with_what_would_be_enough(root, panda, tmp_path):
     gains = {"task_stiffness": [500] * 3 + [30] * 3, "damping_factor": 2, "period": 1e-3, "delay": 1}
     posture = dashpot.audit(panda, HOME, **gains).posture
     assert posture.rotors == "unknown" and posture.gain_margin < 1
@@ -197,6 +197,11 @@ def test_unknown_rotors_are_said_to_be_so_with_what_would_be_enough(root, panda)
     named = dashpot.Robot.from_urdf(*model, drives="panda")
     assert (named.reflected_inertia == drives["reflected_inertia"]).all()
     assert (named.viscous_friction == panda.viscous_friction).all()
+    file = tmp_path / "drives.yaml"
+    file.write_text("reflected_inertia: [1, 1, 1, 1, 1, 1, 1]\nviscous_friction: 3 N m s/rad\n")
+    assert dashpot.Robot.from_urdf(*model, drives=str(file)).viscous_friction.max() == 3
+    assert dashpot.Robot.from_urdf(*model, drives=str(file),
+                                   drives_friction=False).viscous_friction.max() < 3
     rubs = dashpot.Robot.from_urdf(*model, drives="panda", drives_friction=True)
     assert (rubs.viscous_friction == drives["viscous_friction"]).all()
     found = dashpot.audit(named, HOME, **gains).posture
