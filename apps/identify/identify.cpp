@@ -16,9 +16,6 @@
 namespace dashpot::apps {
 namespace {
 
-constexpr const char* kNoneBelieved =
-    "no mode found is believed: record more pushes, in other directions, or a longer record";
-
 constexpr const char* kHelp =
     R"(FILE is an LCM log of `dashpot run` or `dashpot drive`, or a CSV file with a line of names and
 units ("time [s], q1 [rad], ..."). Several files are one experiment. Free decays, after a push, a
@@ -118,8 +115,7 @@ void add_identify(CLI::App& program) {
           "--calibrate: no mode that was measured is like one that is predicted");
     }
     if (any) return;
-    throw std::runtime_error("no modes: " +
-                             (report.advice.empty() ? std::string(kNoneBelieved) : report.advice));
+    throw std::runtime_error("no modes: " + report.advice);
   });
 }
 

@@ -27,6 +27,10 @@ constexpr const char* kNotLinear =
     "most of the motion is not explained by modes, as if joints rub, reach a limit or touch "
     "something: larger pushes or a measured excitation (--inputs) show more, and dashpot calibrate "
     "finds rotors and friction from torques, and the modes that follow";
+constexpr const char* kNoneBelieved =
+    "none of those found is believed: more pushes, in other directions, or a longer record; where "
+    "friction or damping hides modes, dashpot calibrate finds rotors and friction from torques, "
+    "and the modes that follow";
 
 /// True if at most as many modes are rejected as not linear as are believed.
 bool is_linear(const identification::Identification& found) {
@@ -179,7 +183,10 @@ class Task {
     }
     if (bent) report_.notes.emplace_back(kNotLinear);
     if (!report_.postures.empty()) {
-      report_.advice = silent == report_.postures.size() ? kNotLinear : "";
+      const bool any =
+          std::any_of(report_.postures.begin(), report_.postures.end(),
+                      [](const PostureReport& posture) { return !posture.found.modes.empty(); });
+      report_.advice = any ? "" : silent == report_.postures.size() ? kNotLinear : kNoneBelieved;
     } else if (report_.advice == kLargeAdvice) {
       report_.kind = MotionKind::kLargeMotion;
     } else if (report_.kind != MotionKind::kLimitCycle) {

@@ -1,5 +1,6 @@
 // `dashpot identify`: what a user sees.
 #include <dashpot/tests/apps/identify_run.hpp>
+#include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
@@ -93,6 +94,29 @@ TEST(Identify, FindsInScenesWhatIsPredictedOrSaysThatTheyAreNotLinear) {
   }
   const Json friction = found_in("ur5");
   EXPECT_THAT(friction["notes"].dump(), HasSubstr("not explained by modes"));
+}
+
+/// A well-damped arm that rubs: no mode is believed, and the verdict names what finds them.
+TEST(Identify, NamesCalibrateWhereFrictionHidesModes) {
+  const Scratch scratch;
+  for (const char* displacement : {"[2 cm, 1 cm, 1 cm, 0.05, 0, 0.05]", "[0, 2 cm, 0, 0, 0, 0]"}) {
+    const std::string file = scratch.write(
+        "rubs.yaml",
+        "robot:\n  urdf: " + testing::arm_path("ur5") +
+            "\n  base: base_link\n  tip: ee_link\ncontrol: {mode: cartesian}\n"
+            "gains: {task: {stiffness: [600, 600, 600, 30, 30, 30], damping_ratio: 1}}\n"
+            "simulation:\n  robot: {viscous_friction: 0.3, coulomb_friction: 0.2, "
+            "reflected_inertia: 0.1}\n"
+            "  sensors: {position_noise: 1e-5 rad, position_resolution: 1e-5 rad}\n"
+            "scenario:\n  duration: 8 s\n  start: {position: [0, -70 deg, 90 deg, -110 deg, -90 "
+            "deg, 0], tip_displacement: " +
+            std::string(displacement) + "}\n");
+    const std::string log = scratch.path("rubs.lcm");
+    EXPECT_EQ(run_program({"run", file, "--fast", "--log", log}).status, 0);
+    const Json found = no_modes({log});
+    EXPECT_EQ(found["verdict"], "decay");
+    EXPECT_THAT(found["advice"].dump(), HasSubstr("dashpot calibrate")) << displacement;
+  }
 }
 
 TEST(Identify, SaysFirstWhatARecordShows) {
