@@ -33,6 +33,7 @@ struct DriveOptions {
   bool panda = false;
   bool dry_run = false;
   bool commands = false;
+  bool scenario = false;
   bool json = false;
 };
 
@@ -76,10 +77,43 @@ class Inbox {
   DriveSession& session_;
 };
 
+/// Follows the goals of a scenario until a fault.
+class GoalFollower {
+ public:
+  /// Both must outlive it.
+  GoalFollower(LoopGoal& goal, const LoopJournal& journal) : goal_(goal), journal_(journal) {}
+
+  /// Reads the goals, without the place where the scenario starts. Throws InputError.
+  void read(const std::string& path, std::optional<double>& duration) {
+    const Scene scene = load_scene(path);
+    if (!scene.arm) throw InputError("--scenario", path + ": is a scene without an arm");
+    if (!duration) duration = scene.duration;
+    for (const ScenarioStep& step : scene.steps) {
+      if (step.payload) throw InputError("--scenario", path + ": has a payload, for dashpot run");
+    }
+    steps_ = scene.steps;
+    next_ = 1;
+  }
+
+  /// Goes to the goal of `time`, s since the arm is held. The gains of steps do not count.
+  void follow(double time) noexcept {
+    if (journal_.record.faults > 0) next_ = steps_.size();
+    for (; next_ < steps_.size() && time >= steps_[next_].at; ++next_) {
+      goal_.hold(steps_[next_].setpoint);
+    }
+  }
+
+ private:
+  LoopGoal& goal_;
+  const LoopJournal& journal_;
+  std::vector<ScenarioStep> steps_;
+  std::size_t next_ = 0;
+};
+
 /// Answers statuses until the user, the time or a refusal ends it. In the first two cases the arm
 /// first stops and the torque fades. Returns why it ended.
 std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::DriverKind driver,
-                     DriveSession& session) {
+                     DriveSession& session, GoalFollower& goals) {
   constexpr int kWait = 50;       // ms
   constexpr double kSilence = 2;  // s without a status until a message is printed
   const lcmtypes::DriverProfile& profile = lcmtypes::profile_of(driver);
@@ -128,6 +162,7 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     const bool ran = session.running();
     const lcmtypes::DriverStatus status = std::move(*inbox.newest);
     inbox.newest.reset();
+    if (session.running()) goals.follow(since(began));
     const bool answers = session.take(status, inbox.arrived, now, command);
     if (!ran && session.running()) {
       began = Clock::now();
@@ -168,7 +203,7 @@ std::shared_ptr<lcm::LCM> drive_bus(const DriveOptions& options) try {
   throw InputError("--lcm-url", error.what());
 }
 
-void drive(const DriveOptions& options) {
+void drive(DriveOptions options) {
   if (options.iiwa == options.panda) throw InputError("--iiwa, --panda", "one of them is wanted");
   const auto driver = options.iiwa ? lcmtypes::DriverKind::kIiwa : lcmtypes::DriverKind::kPanda;
   const CommandedConfig file = load_commanded_config(options.config);
@@ -196,6 +231,8 @@ void drive(const DriveOptions& options) {
   LoopJournal journal(*controller, goal, publisher, commands ? &*commands : nullptr,
                       LoopJournal::Pace::kRealTime);
   DriveReport report;
+  GoalFollower goals(goal, journal);
+  if (options.scenario) goals.read(options.config, options.duration);
   DriveSession session(file.config, *controller, goal, journal, {driver, options.dry_run});
   const StopSignal stop;
   std::signal(SIGPIPE, SIG_IGN);  // a reader that closes its pipe must not end the loop
@@ -204,7 +241,7 @@ void drive(const DriveOptions& options) {
   schedule_ahead_of_others();
   std::exception_ptr failure;
   try {
-    report.ended = converse(options, *bus, driver, session);
+    report.ended = converse(options, *bus, driver, session, goals);
   } catch (const InputError& error) {
     if (!session.running()) throw;
     report.ended = error.what();
@@ -252,8 +289,12 @@ void add_drive(CLI::App& program) {
   command->add_flag("--panda", options->panda, "By drake-franka-driver")->excludes(iiwa);
   command->add_flag("--dry-run", options->dry_run,
                     "Computes and publishes everything, and commands nothing");
-  command->add_flag("--commands", options->commands,
-                    "Take commands from the bus; without it none are taken");
+  CLI::Option* commands = command->add_flag(
+      "--commands", options->commands, "Take commands from the bus; without it none are taken");
+  command
+      ->add_flag("--scenario", options->scenario,
+                 "Goes to the goals of scenario.steps, as dashpot run does, without their gains")
+      ->excludes(commands);
   command->add_option("--duration", options->duration, "Ends after this time, s")
       ->transform(quantity("s", 1e-3, 1e7, "a time from 1e-3 to 1e7 s"))
       ->option_text("S");
