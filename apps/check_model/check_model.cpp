@@ -1,16 +1,20 @@
 #include <dashpot/apps/check_model/calibrated_modes.hpp>
 #include <dashpot/apps/check_model/check_model_report.hpp>
+#include <dashpot/apps/check_model/suggested_motion.hpp>
 #include <dashpot/apps/check_model/torque_file.hpp>
 #include <dashpot/apps/check_model/written_arm.hpp>
+#include <dashpot/apps/check_model/written_model.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/drives.hpp>
+#include <dashpot/controller/rotors.hpp>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -23,22 +27,46 @@ using controller::JointVector;
 
 struct CheckModelOptions {
   std::vector<std::string> files;
-  std::string config, positions, torques, write, write_drives, payload = "fitted";
+  std::string config, positions, torques, write, write_drives, mjcf, suggest, payload = "fitted";
   FileHints hints;
   double validation = 0;
   bool calibrates = false, json = false;
 };
 
-/// Returns the mean posture of records.
-JointVector rest_of(const std::vector<identification::TorqueRecord>& records) {
+/// Finds mean and range of the positions of records.
+void find_postures(const std::vector<identification::TorqueRecord>& records,
+                   CheckModelReport& report) {
   JointVector sum = JointVector::Zero(records.front().position.rows());
   double count = 0;
   for (const identification::TorqueRecord& record : records) {
     for (const auto& position : record.position.colwise()) {
-      if (position.allFinite()) sum += position, ++count;
+      if (!position.allFinite()) continue;
+      report.lowest = count == 0 ? JointVector(position) : report.lowest.cwiseMin(position);
+      report.highest = count == 0 ? JointVector(position) : report.highest.cwiseMax(position);
+      sum += position, ++count;
     }
   }
-  return sum / std::max(1.0, count);
+  report.rest = sum / std::max(1.0, count);
+}
+
+/// Notes rotors that are kept against the records, and why records may show none.
+void note_rotors(const Config& config, CheckModelReport& report) {
+  for (std::string& kept : kept_rotors(config, report)) report.notes.push_back(std::move(kept));
+  int seen = 0, unknown = 0;
+  for (const identification::JointCheck& joint : report.check.joints) {
+    if (!joint.moves || !std::isfinite(joint.reflected_inertia.deviation)) continue;
+    ++seen;
+    unknown += joint.reflected_inertia.determined ? 0 : 1;
+  }
+  const controller::Drives* like = controller::drives_like(config.model);
+  const bool behind =
+      like != nullptr && (like->name.starts_with("panda") || like->name.starts_with("fr3") ||
+                          like->name.starts_with("iiwa"));
+  if (unknown == 0 || (unknown < seen && !behind)) return;
+  report.notes.emplace_back(
+      "torque sensors behind the gears, as in Panda, FR3 and iiwa, hardly see rotors: ask the "
+      "maker "
+      "for undetermined ones, or take public values (robot.drives)");
 }
 
 CheckModelReport check_files(const CheckModelOptions& options, const Config& config) {
@@ -58,20 +86,22 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
     records.push_back(std::move(file.record));
     report.files.push_back(path);
   }
-  for (const Joint& joint : config.model.joints()) {
-    report.joints.push_back(joint.name);
-    report.slides.push_back(joint.type == controller::JointType::kPrismatic);
-  }
+  for (const Joint& joint : config.model.joints()) report.joints.push_back(joint.name);
+  report.torque_unit = controller::unit_text(config.model, "N m", "N");
+  report.damping_unit = controller::unit_text(config.model, "N m s/rad", "N s/m");
+  report.inertia_unit = controller::unit_text(config.model, "kg m^2", "kg");
   report.calibrates = options.calibrates;
   show_progress(
       static_cast<double>(report.files.size()) / static_cast<double>(options.files.size() + 1),
       "comparing torques");
   try {
+    report.payload_known = options.payload == "known";
     report.check = identification::check_model(config.robot, records,
-                                               {options.validation, options.payload == "known"});
+                                               {options.validation, report.payload_known});
     if (options.calibrates && report.check.order.empty()) {
-      report.rest = rest_of(records);
+      find_postures(records, report);
       report.loop = calibrated_loop(config, report.check, report.rest);
+      note_rotors(config, report);
     }
   } catch (const controller::InvalidModel&) {
     throw;
@@ -106,10 +136,12 @@ void add_command(CLI::App* command, bool calibrates) {
                    "Names and units of all columns, of files without a line of them")
       ->option_text("NAME,...");
   command
-      ->add_option("--write", options->write,
-                   calibrates
-                       ? "The configuration with all that was determined"
-                       : "The configuration with the friction and the payload that were found")
+      ->add_option(
+          "--write", options->write,
+          calibrates
+              ? "The configuration with all that was determined; or, by its ending, the "
+                "robot's URDF (.urdf) or MuJoCo model (.xml, --mjcf) with rotors and friction"
+              : "The configuration with the friction and the payload that were found")
       ->option_text("CONFIG");
   if (calibrates) {
     options->validation = 0.2;
@@ -117,6 +149,15 @@ void add_command(CLI::App* command, bool calibrates) {
         ->add_option("--write-drives", options->write_drives,
                      "Rotors and friction as a file for --drives and robot.drives")
         ->option_text("FILE.yaml");
+    command
+        ->add_option("--suggest-motion", options->suggest,
+                     "The configuration with goals that determine what the records do not, for "
+                     "dashpot run, or dashpot drive --scenario")
+        ->option_text("SCENE.yaml");
+    command
+        ->add_option("--mjcf", options->mjcf,
+                     "MuJoCo model of the arm, of which --write FILE.xml makes a copy")
+        ->option_text("FROM.xml");
     command
         ->add_option("--validate", options->validation,
                      "Share of each record, its end, on which the fit is judged (0.2)")
@@ -134,15 +175,36 @@ void add_command(CLI::App* command, bool calibrates) {
       "Several files are one experiment. Velocities are not needed.\n" +
       std::string(kExitStatusHelp));
   command->callback([options] {
-    std::vector<NamedFile> inputs = {{"--config", options->config}};
+    std::vector<NamedFile> inputs = {{"--config", options->config}, {"--mjcf", options->mjcf}};
     add_records(options->files, inputs);
-    check_outputs({{"--write", options->write}, {"--write-drives", options->write_drives}}, inputs);
+    check_outputs({{"--write", options->write},
+                   {"--write-drives", options->write_drives},
+                   {"--suggest-motion", options->suggest}},
+                  inputs);
     if (!options->write_drives.empty() && !controller::is_drives_file(options->write_drives)) {
       throw InputError("--write-drives", "the name has to end with .yaml");
     }
+    const bool to_mjcf = options->calibrates && options->write.ends_with(".xml");
+    if (!to_mjcf && !options->mjcf.empty()) {
+      throw InputError("--mjcf", "is for --write FILE.xml");
+    }
     const Config config = controller::load_config(options->config);
+    if (to_mjcf && options->mjcf.empty()) {
+      throw InputError("--write", "the robot comes from a URDF, " + config.robot.urdf +
+                                      ": end the name with .urdf, or name the MuJoCo model of the "
+                                      "arm with --mjcf");
+    }
+    const bool to_model = options->calibrates && is_model_file(options->write);
+    check_outputs({{"--write", options->write}}, {{"the robot description", config.robot.urdf}});
     CheckModelReport report = check_files(*options, config);
-    if (!options->write.empty()) write_config(options->config, options->write, config, report);
+    if (to_model) {
+      write_model(options->write, options->mjcf, config, report);
+    } else if (!options->write.empty()) {
+      write_config(options->config, options->write, config, report);
+    }
+    if (!options->suggest.empty()) {
+      suggest_motion(options->config, options->suggest, config, report);
+    }
     if (!options->write_drives.empty()) write_drives(options->write_drives, config, report);
     print(options->json ? json_text(check_model_json(report)) : check_model_table(report));
   });

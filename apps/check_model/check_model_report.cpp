@@ -45,24 +45,16 @@ std::string kind_sentence(TorqueKind kind) {
   return "";
 }
 
-/// The unit of revolute joints, of prismatic ones, or both.
-std::string unit_of(const CheckModelReport& report, const char* turns, const char* slides) {
-  const auto count = std::count(report.slides.begin(), report.slides.end(), true);
-  if (count == 0) return turns;
-  if (static_cast<std::size_t>(count) == report.slides.size()) return slides;
-  return std::string(turns) + " (" + slides + ")";
-}
-
 std::string joints_table(const CheckModelReport& report) {
-  const std::string torque = unit_of(report, "N m", "N");
+  const std::string& torque = report.torque_unit;
   TextTable table({{Align::kRight, {"", "joint"}},
                    {Align::kLeft, {"", "name"}},
                    {Align::kPoint, {"left over", "before"}},
                    {Align::kPoint, {torque, "after"}},
                    {Align::kLeft, {"offset", torque}},
                    {Align::kLeft, {"Coulomb friction", torque}},
-                   {Align::kLeft, {"viscous friction", unit_of(report, "N m s/rad", "N s/m")}},
-                   {Align::kLeft, {"reflected inertia", unit_of(report, "kg m^2", "kg")}}});
+                   {Align::kLeft, {"viscous friction", report.damping_unit}},
+                   {Align::kLeft, {"reflected inertia", report.inertia_unit}}});
   if (report.calibrates) {
     table.add_column(Align::kPoint, {"explained, %", "before"});
     table.add_column(Align::kPoint, {"", "after"});
@@ -96,9 +88,11 @@ std::string delay_text(const Estimate& delay) {
 /// The number of determined parameters, and the motion that would determine each other one.
 std::string determined_text(const CheckModelReport& report) {
   const ModelCheck& check = report.check;
-  std::string text = "The records determine " + std::to_string(check.rank) + " of " +
-                     std::to_string(check.parameters) + " parameters, the best " +
-                     format_number(check.condition, 2) + " times better than the worst\n";
+  std::string text =
+      "The records tell " +
+      (check.rank == check.parameters ? "all " : std::to_string(check.rank) + " of ") +
+      std::to_string(check.parameters) + " parameters apart, the clearest " +
+      format_number(check.condition, 2) + " times as well as the faintest\n";
   for (std::size_t i = 0; i < check.joints.size(); ++i) {
     if (check.joints[i].wanted.empty()) continue;
     text += "  joint " + std::to_string(i + 1) + ": " + check.joints[i].wanted + "\n";

@@ -25,11 +25,12 @@ struct CalibratedLoop {
 struct CheckModelReport {
   identification::ModelCheck check;
   std::vector<std::string> files;
-  std::vector<std::string> joints;  ///< names
-  std::vector<bool> slides;         ///< prismatic joints: N for N m, kg for kg m^2
+  std::vector<std::string> joints;                      ///< names
+  std::string torque_unit, damping_unit, inertia_unit;  ///< of figures of all joints
   std::vector<std::string> notes;
   bool calibrates = false;  ///< of `dashpot calibrate`
-  controller::JointVector rest;
+  bool payload_known = false;
+  controller::JointVector rest, lowest, highest;  ///< mean and range of the records' positions
   CalibratedLoop loop;  ///< at `rest`, with the gains of the configuration
 };
 

@@ -3,6 +3,7 @@
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/controller/drives.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -25,22 +26,23 @@ struct FigurePlace {
   Estimate JointCheck::*found;
   double Joint::*known;
   const char* key;
+  std::string CheckModelReport::*unit;
 };
 
 FigurePlace place_of(ArmFigure figure) {
   switch (figure) {
     case ArmFigure::kReflectedInertia:
-      return {&JointCheck::reflected_inertia, &Joint::reflected_inertia, "reflected_inertia"};
+      return {&JointCheck::reflected_inertia, &Joint::reflected_inertia, "reflected_inertia",
+              &CheckModelReport::inertia_unit};
     case ArmFigure::kViscousFriction:
-      return {&JointCheck::viscous_friction, &Joint::viscous_friction, "viscous_friction"};
+      return {&JointCheck::viscous_friction, &Joint::viscous_friction, "viscous_friction",
+              &CheckModelReport::damping_unit};
     case ArmFigure::kCoulombFriction:
       break;
   }
-  return {&JointCheck::coulomb_friction, &Joint::coulomb_friction, "coulomb_friction"};
+  return {&JointCheck::coulomb_friction, &Joint::coulomb_friction, "coulomb_friction",
+          &CheckModelReport::torque_unit};
 }
-
-constexpr std::array kFigures = {ArmFigure::kReflectedInertia, ArmFigure::kViscousFriction,
-                                 ArmFigure::kCoulombFriction};
 
 std::string yaml_list(const Eigen::VectorXd& values) {
   std::string text;
@@ -52,49 +54,27 @@ std::string yaml_list(const Eigen::VectorXd& values) {
   return "[" + text + "]";
 }
 
-/// Date, records and deviations, lines of a comment.
-std::string origin(const CheckModelReport& report) {
-  const auto today = std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now());
-  const std::chrono::year_month_day date(today);
-  char day[40];
-  std::snprintf(day, sizeof day, "%d-%02u-%02u", static_cast<int>(date.year()),
-                static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()));
-  std::string text = std::string("# dashpot calibrate, ") + day + ", from";
-  for (const std::string& file : report.files) {
-    text += " " + controller::one_line(std::filesystem::path(file).filename().string());
-  }
-  text += "\n# One standard deviation; ? was not determined and is as it was before:\n";
-  for (const ArmFigure figure : kFigures) {
-    const FigurePlace place = place_of(figure);
-    text += std::string("#   ") + place.key + ":";
-    for (const JointCheck& joint : report.check.joints) {
-      const Estimate& one = joint.*place.found;
-      char number[40];
-      std::snprintf(number, sizeof number, " %.2g", one.deviation);
-      text += one.determined ? number : " ?";
-    }
-    text += "\n";
-  }
-  return text;
+constexpr double kShown = 3;    // deviations: a rotor of less may be noise
+constexpr double kRefutes = 4;  // deviations from what the configuration says
+
+/// Whether the records contradict what the configuration says of a figure.
+bool refutes(const Estimate& one, double known) {
+  return known > 0 && std::isfinite(one.deviation) &&
+         std::abs(one.value - known) > kRefutes * one.deviation;
 }
 
-void refuse_doubtful(const std::string& option, const ModelCheck& check) {
-  if (!check.order.empty()) {
-    throw InputError(option, "nothing is written, because " + check.order.front());
-  }
-  if (check.gravity && !check.gravity_fits) {
-    throw InputError(option,
-                     "nothing is written, because no direction of robot.gravity fits: how is the "
-                     "base inclined?");
-  }
+/// Whether a figure is taken from the records: it is determined, or nearer than the configuration
+/// is. No rotor at all is what torque sensors behind the gear show, and is not taken.
+bool is_taken(const Estimate& one, double known, ArmFigure figure) {
+  const bool shown = figure != ArmFigure::kReflectedInertia || one.value > kShown * one.deviation;
+  return one.determined || (shown && refutes(one, known));
 }
 
 std::vector<ConfigChange> changes_for(const std::string& from_file, const std::string& to_file,
                                       const Config& config, const CheckModelReport& report) {
-  namespace fs = std::filesystem;
   const ModelCheck& check = report.check;
-  std::vector<ConfigChange> changes;
-  for (const ArmFigure figure : kFigures) {
+  std::vector<ConfigChange> changes = path_changes(from_file, to_file, config);
+  for (const ArmFigure figure : kArmFigures) {
     if (figure == ArmFigure::kReflectedInertia && !report.calibrates) continue;
     const JointVector values = determined(config, check, figure);
     if (figure == ArmFigure::kReflectedInertia && values.isZero(0)) continue;
@@ -112,6 +92,52 @@ std::vector<ConfigChange> changes_for(const std::string& from_file, const std::s
     changes.push_back({{"robot", "payload", "mass"}, mass.substr(1, mass.size() - 2)});
     changes.push_back({{"robot", "payload", "center"}, yaml_list(payload->center)});
   }
+  if (report.loop.delay_found) {
+    changes.push_back({{"analysis", "sampled", "delay"}, std::to_string(report.loop.delay)});
+  }
+  return changes;
+}
+
+}  // namespace
+
+std::optional<double> found_figure(const Config& config, const ModelCheck& check, ArmFigure figure,
+                                   std::size_t j) {
+  const FigurePlace place = place_of(figure);
+  const Estimate& one = check.joints[j].*place.found;
+  if (!is_taken(one, config.model.joints()[j].*place.known, figure)) return std::nullopt;
+  return std::max(0.0, one.value);
+}
+
+JointVector determined(const Config& config, const ModelCheck& check, ArmFigure figure) {
+  JointVector result = config.model.joint_values(place_of(figure).known);
+  for (std::size_t j = 0; j < check.joints.size(); ++j) {
+    double& value = result[static_cast<Eigen::Index>(j)];
+    value = found_figure(config, check, figure, j).value_or(value);
+  }
+  return result;
+}
+
+std::vector<std::string> kept_rotors(const Config& config, const CheckModelReport& report) {
+  std::vector<std::string> kept;
+  for (std::size_t j = 0; j < report.check.joints.size(); ++j) {
+    const Estimate& one = report.check.joints[j].reflected_inertia;
+    const Joint& joint = config.model.joints()[j];
+    const double known = joint.reflected_inertia;
+    if (is_taken(one, known, ArmFigure::kReflectedInertia) || !refutes(one, known)) continue;
+    const std::string unit = joint.type == controller::JointType::kPrismatic ? " kg" : " kg m^2";
+    kept.push_back("joint " + std::to_string(j + 1) + ": its reflected inertia stays " +
+                   text::number(known, 3) + unit + " though the records show none (" +
+                   text::number(one.value, 2) + " +- " + text::number(one.deviation, 2) + unit +
+                   "), as torque sensors behind the gear do; if yours are on the motor's side, "
+                   "write 0");
+  }
+  return kept;
+}
+
+std::vector<ConfigChange> path_changes(const std::string& from_file, const std::string& to_file,
+                                       const Config& config) {
+  namespace fs = std::filesystem;
+  std::vector<ConfigChange> changes;
   const fs::path from = fs::absolute(from_file).parent_path().lexically_normal();
   const fs::path to = fs::absolute(to_file).parent_path().lexically_normal();
   if (from != to) {
@@ -124,24 +150,6 @@ std::vector<ConfigChange> changes_for(const std::string& from_file, const std::s
     }
   }
   return changes;
-}
-
-void write(const std::string& option, const std::string& path, const std::string& text) {
-  OutputFile file(option, path);
-  file.write(text);
-  file.finish();
-}
-
-}  // namespace
-
-JointVector determined(const Config& config, const ModelCheck& check, ArmFigure figure) {
-  const FigurePlace place = place_of(figure);
-  JointVector result = config.model.joint_values(place.known);
-  for (std::size_t j = 0; j < check.joints.size(); ++j) {
-    const Estimate& one = check.joints[j].*place.found;
-    if (one.determined) result[static_cast<Eigen::Index>(j)] = std::max(0.0, one.value);
-  }
-  return result;
 }
 
 std::optional<controller::Payload> determined_payload(const ModelCheck& check) {
@@ -157,22 +165,68 @@ std::optional<controller::Payload> determined_payload(const ModelCheck& check) {
   return result;
 }
 
+std::string origin(const Config& config, const CheckModelReport& report) {
+  const auto today = std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now());
+  const std::chrono::year_month_day date(today);
+  char day[40];
+  std::snprintf(day, sizeof day, "%d-%02u-%02u", static_cast<int>(date.year()),
+                static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()));
+  std::string text = std::string("# dashpot calibrate, ") + day + ", from";
+  for (const std::string& file : report.files) {
+    text += " " + controller::one_line(std::filesystem::path(file).filename().string());
+  }
+  text += "\n# One standard deviation; ? was not determined and is as it was before:\n";
+  for (const ArmFigure figure : kArmFigures) {
+    const FigurePlace place = place_of(figure);
+    text += std::string("#   ") + place.key + ":";
+    for (std::size_t j = 0; j < report.check.joints.size(); ++j) {
+      const Estimate& one = report.check.joints[j].*place.found;
+      const bool found = found_figure(config, report.check, figure, j).has_value();
+      text += found ? " " + text::number(one.deviation, 2) : " ?";
+    }
+    text += "\n";
+  }
+  if (report.loop.delay_found) {
+    text += "#   delay: " + text::number(report.check.delay.deviation, 2) + " s\n";
+  }
+  for (const std::string& kept : kept_rotors(config, report)) text += "# " + kept + "\n";
+  return text;
+}
+
+void refuse_doubtful(const std::string& option, const ModelCheck& check) {
+  if (!check.order.empty()) {
+    throw InputError(option, "nothing is written, because " + check.order.front());
+  }
+  if (check.gravity && !check.gravity_fits) {
+    throw InputError(option,
+                     "nothing is written, because no direction of robot.gravity fits: how is the "
+                     "base inclined?");
+  }
+}
+
+void write_text(const std::string& option, const std::string& path, const std::string& text) {
+  OutputFile file(option, path);
+  file.write(text);
+  file.finish();
+}
+
 void write_config(const std::string& from, const std::string& to, const Config& config,
                   CheckModelReport& report) {
   refuse_doubtful("--write", report.check);
   bool kept = true;
   const std::string text =
       changed_config(text::read_regular_file(from), changes_for(from, to, config, report), kept);
-  write("--write", to, (report.calibrates ? origin(report) : "") + text);
+  write_text("--write", to, (report.calibrates ? origin(config, report) : "") + text);
   if (!kept) report.notes.push_back("the comments of " + from + " were not kept");
 }
 
 void write_drives(const std::string& to, const Config& config, const CheckModelReport& report) {
   refuse_doubtful("--write-drives", report.check);
-  std::string text = origin(report), missing;
-  for (const ArmFigure figure : kFigures) {
-    text += std::string(place_of(figure).key) + ": " +
-            yaml_list(determined(config, report.check, figure)) + "\n";
+  std::string text = origin(config, report), missing;
+  for (const ArmFigure figure : kArmFigures) {
+    const FigurePlace place = place_of(figure);
+    text += std::string(place.key) + ": " + yaml_list(determined(config, report.check, figure)) +
+            "  # " + report.*place.unit + "\n";
   }
   for (std::size_t j = 0; j < report.joints.size(); ++j) {
     if (report.check.joints[j].reflected_inertia.determined) continue;
@@ -182,7 +236,7 @@ void write_drives(const std::string& to, const Config& config, const CheckModelR
   for (const std::string& file : report.files) files += " " + file;
   text += "source: " + nlohmann::json(files).dump() + "\n";
   if (!missing.empty()) text += "doubt: the rotors of joints " + missing + " are not determined\n";
-  write("--write-drives", to, text);
+  write_text("--write-drives", to, text);
 }
 
 }  // namespace dashpot::apps

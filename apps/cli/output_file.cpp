@@ -79,7 +79,8 @@ void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<Name
       throw InputError(output.what, "is the same file as " + other.what);
     }
     const std::string kind = fs::path(output.path).extension();
-    const bool told = output.what == "--write" || output.what == "--output";  // configurations
+    const bool told = output.what == "--write" || output.what == "--output" ||
+                      output.what == "--write-drives" || output.what == "--suggest-motion";
     std::error_code none;
     for (const char* kept : {".yaml", ".yml", ".urdf", ".xacro", ".xml"}) {
       if (told || kind != kept || !fs::exists(output.path, none)) continue;

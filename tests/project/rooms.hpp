@@ -135,7 +135,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/export", 2, {}, {""}},
       {"apps/command", 2, {}, {""}},
       {"apps/identify", 2, {}, {""}},
-      {"apps/check_model", 2, {}, {""}},
+      {"apps/check_model", 4, {}, {""}},
       {"apps/audit", 3, {}, {""}},
       {"apps/loop", 3, {}, {""}},
       {"apps/web", 3, {}, {""}},
