@@ -166,7 +166,6 @@ class Audit {
       const analysis::System<kMaxJoints>& system,
       const std::function<analysis::SampledLoop()>& sampled) const;
   analysis::SampledLoop loop(const JointVector& q, const DynamicsResult& robot) const;
-  bool kinematic() const noexcept { return options_.null_projector == NullProjector::kKinematic; }
   /// Returns the closed loop, with elastic joints where there are some.
   analysis::System<> system_of(const analysis::TaskImpedance& impedance) const;
   /// Returns the springs and dampers that act at a posture.

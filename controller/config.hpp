@@ -58,6 +58,10 @@ enum class GainPairs { kTogether, kEither };
 void read_gains(const text::YamlMapping& parent, const RobotModel& model, GainPairs pairs,
                 Gains& gains);
 
+/// Sets the projector that stands under `control`. Throws InputError.
+void read_null_projector(const text::YamlMapping& root, const RobotModel& model,
+                         NullProjector& projector);
+
 /// Returns the gains under the key `gains` of `parent`, one without the other. What is missing is
 /// zero. Throws InputError.
 Gains read_gains(const text::YamlMapping& parent, const RobotModel& model);

@@ -9,6 +9,8 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <string_view>
+#include <utility>
 
 namespace dashpot::controller {
 
@@ -80,7 +82,23 @@ enum class Mode : std::uint8_t {
 enum class NullProjector : std::uint8_t {
   kDynamic,    ///< X = M^-1 J' (J M^-1 J')^-1: nothing that acts there moves the tip
   kKinematic,  ///< X the pseudo-inverse J' (J J')^-1: a tip at rest under no load feels nothing
+  kNone,       ///< X = 0: springs in all joints beside those of the tip, on arms of any joints
 };
+/// Their names, in the order of the enumerators.
+inline constexpr std::array<std::pair<std::string_view, NullProjector>, 3> kNullProjectors = {
+    {{"dynamic", NullProjector::kDynamic},
+     {"kinematic", NullProjector::kKinematic},
+     {"none", NullProjector::kNone}}};
+inline constexpr std::string_view name_of(NullProjector projector) noexcept {
+  return kNullProjectors[static_cast<std::size_t>(projector)].first;
+}
+/// Returns the projector of a name; kDynamic of a name that is none.
+inline constexpr NullProjector null_projector_of(std::string_view name) noexcept {
+  for (const auto& [of, projector] : kNullProjectors) {
+    if (of == name) return projector;
+  }
+  return NullProjector::kDynamic;
+}
 
 /// The axes in which K_C, C_C and `directions` are given.
 enum class Frame : std::uint8_t { kBase, kTool };
@@ -114,7 +132,8 @@ struct Gains {
   JointVector null_damping;    ///< n, N m s/rad, within the free motions
   /// Damping ratio that the free motions are to have with null_stiffness, 0 < ratio <= 2: their
   /// damping is then designed at every tick (see NullSpace::ratio_damping), and null_damping acts
-  /// only if null_stiffness is zero. 0: null_damping acts.
+  /// only if null_stiffness is zero. 0: null_damping acts. With NullProjector::kNone and a
+  /// task_damping_ratio, all springs together have the task's ratio.
   double null_damping_ratio = 0;
 };
 

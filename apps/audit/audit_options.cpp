@@ -35,9 +35,9 @@ std::vector<std::string> preset_names() {
   return names;
 }
 
-/// Sets the gains of a preset for n joints, except the task's damping, which follows from the
-/// factor.
-void take_preset(const std::string& name, int n, AuditOptions& audit) {
+/// Sets the gains of a preset for n joints, or the factor from which the task's damping follows.
+void take_preset(const std::string& name, int n, AuditOptions& audit,
+                 std::optional<double>& factor) {
   const GainPreset& preset = *std::find_if(kPresets.begin(), kPresets.end(),
                                            [&](const auto& one) { return one.name == name; });
   controller::Vector6 diagonal;
@@ -49,6 +49,20 @@ void take_preset(const std::string& name, int n, AuditOptions& audit) {
   audit.gains.null_stiffness.setConstant(n, preset.null_space);
   audit.gains.null_damping.setConstant(n, kPresetFactor * std::sqrt(preset.null_space));
   audit.null_projector = controller::NullProjector::kKinematic;
+  if (preset.joints == nullptr) {
+    if (!factor) factor = kPresetFactor;
+    return;
+  }
+  const JointGains& joints = *preset.joints;
+  if (n != static_cast<int>(joints.stiffness.size())) {
+    throw InputError("--preset", name + " has gains for seven joints, the arm has " +
+                                     std::to_string(n));
+  }
+  const double t = joints.translation, r = joints.rotation;
+  audit.gains.task_damping = controller::Vector6{t, t, t, r, r, r}.asDiagonal();
+  audit.gains.null_stiffness = Eigen::Map<const Eigen::VectorXd>(joints.stiffness.data(), n);
+  audit.gains.null_damping = Eigen::Map<const Eigen::VectorXd>(joints.damping.data(), n);
+  audit.null_projector = controller::NullProjector::kNone;
 }
 
 /// Sets the gains of a configuration file.
@@ -57,12 +71,7 @@ void read_gains_file(const std::string& path, const RobotModel& model, AuditOpti
   const text::YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("gains")) throw InputError("gains", "missing");
   audit.gains = controller::read_gains(root, model);
-  const text::YamlNode* control = root.find("control");
-  for (std::size_t i = 0; control != nullptr && i + 1 < control->items.size(); i += 2) {
-    if (control->items[i].text == "null_projector" && control->items[i + 1].text == "kinematic") {
-      audit.null_projector = controller::NullProjector::kKinematic;
-    }
-  }
+  read_null_projector(root, model, audit.null_projector);
 } catch (const InputError& error) {
   throw error.in_file(path);
 }
@@ -118,17 +127,14 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
                 double& intended_ratio) {
   std::optional<double> factor = command.damping_factor;
   if (!command.preset.empty()) {
-    take_preset(command.preset, model.dof(), audit);
-    if (!factor) factor = kPresetFactor;
+    take_preset(command.preset, model.dof(), audit, factor);
   }
   if (!command.gains.empty()) read_gains_file(command.gains, model, audit);
   read_options_gains(command, model, audit);
   if (command.mode == "joint") audit.mode = Mode::kJoint;
   if (!command.rotation.empty()) audit.half_quaternion = command.rotation == "half-quaternion";
   if (!command.null_projector.empty()) {
-    audit.null_projector = command.null_projector == "kinematic"
-                               ? controller::NullProjector::kKinematic
-                               : controller::NullProjector::kDynamic;
+    audit.null_projector = controller::null_projector_of(command.null_projector);
   }
   if (command.frame == "tool") audit.gains.frame = controller::Frame::kTool;
   controller::Gains& gains = audit.gains;
@@ -285,8 +291,8 @@ CLI::Option* add_stated_options(CLI::App& command, AuditCommand& options) {
       "a,b,...|x (0)");
   add("--null-damping", options.null_damping, "Of the same", "a,b,...|x (0)");
   add("--null-projector", options.null_projector, "Through which they act",
-      "dynamic|kinematic (dynamic)")
-      ->check(CLI::IsMember({"dynamic", "kinematic"}));
+      "dynamic|kinematic|none (dynamic)")
+      ->check(CLI::IsMember({"dynamic", "kinematic", "none"}));
   add_model_options(command, arm);
   add_loop_options(command, options.timing);
   for (CLI::Option* option : command.get_options([&](const CLI::Option* one) {

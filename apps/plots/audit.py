@@ -16,7 +16,7 @@ import subprocess
 import sys
 
 PRESETS = ["libfranka", "franka_ros", "panda_py", "crisp", "cartesian_impedance_controller", "franky",
-           "deoxys"]
+           "deoxys", "polymetis"]
 HOME = "0,-45 deg,0,-135 deg,0,90 deg,45 deg"
 FRANKAS = {name: ["--urdf", f"sim/models/{name}.urdf", "--base", f"{name}_link0", "--tip",
                   f"{name}_hand_tcp", "--q", HOME] for name in ("panda", "fr3")}
@@ -64,7 +64,8 @@ def preset_row(name, preset, samples):
     found = audit(arm, "--samples", samples, "--spread", "1.4")
     posture, workspace = found["posture"], found["workspace"]["smallest_ratio"]
     with_rotors = audit(arm, "--drives", name)["posture"]
-    return [f"`{preset}`", f"{found['intended_ratio']:.3g}", ratios(posture),
+    meant = found["intended_ratio"]
+    return [f"`{preset}`", f"{meant:.3g}" if meant else "-", ratios(posture),
             f"{workspace['median']:.3f}, {workspace['p05']:.3f}", f"{posture['gain_margin']:.2f}",
             enough(posture), ratios(with_rotors), f"{with_rotors['fastest_pole']:.1f}",
             f"{with_rotors['gain_margin']:.2f}"]

@@ -43,6 +43,8 @@ std::string random_token() {
 Json presets_json(int n) {
   Json list = Json::array();
   for (const GainPreset& preset : kPresets) {
+    const JointGains* joints = preset.joints;
+    if (joints != nullptr && n != static_cast<int>(joints->stiffness.size())) continue;
     const double t = preset.translation, r = preset.rotation;
     list.push_back(
         {{"name", std::string(preset.name)},
@@ -56,6 +58,12 @@ Json presets_json(int n) {
            {"null_projector", "kinematic"},
            {"rotation", preset.half_quaternion ? "half-quaternion" : "vector"},
            {"inertia_blocks", preset.inertia_blocks}}}});
+    if (joints == nullptr) continue;
+    const double c = joints->translation, w = joints->rotation;
+    list.back()["design"].update({{"damping", {c, c, c, w, w, w}},
+                                  {"null_stiffness", joints->stiffness},
+                                  {"null_damping", joints->damping},
+                                  {"null_projector", "none"}});
   }
   controller::Matrix6 C = controller::Vector6{0.1, 0.1, 0.1, 10, 10, 1}.asDiagonal();
   C(2, 4) = C(4, 2) = 10;

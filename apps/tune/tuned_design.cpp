@@ -16,7 +16,6 @@ namespace {
 using controller::InputError;
 using controller::JointVector;
 using controller::Mode;
-using controller::NullProjector;
 using text::Range;
 using text::YamlMapping;
 using text::YamlNode;
@@ -230,10 +229,7 @@ TunedDesign read_design(const TunedArm& arm, const Json& design) {
               stated.mode);
   read_choice(keys, "rotation", Choices<bool>{{{"vector", false}, {"half-quaternion", true}}},
               stated.half_quaternion);
-  read_choice(keys, "null_projector",
-              Choices<NullProjector>{
-                  {{"dynamic", NullProjector::kDynamic}, {"kinematic", NullProjector::kKinematic}}},
-              stated.null_projector);
+  read_choice(keys, "null_projector", controller::kNullProjectors, stated.null_projector);
   read_switch(keys, "inertia_blocks", stated.inertia_blocks);
   stated.period = arm.settings().period;
   read_number(keys, "period", "s", {0, true, 1}, stated.period);
@@ -274,8 +270,7 @@ Json design_json(const TunedArm& arm) {
           {"null_stiffness", of_joints(gains.null_stiffness)},
           {"null_damping",
            damping_json(gains.null_damping_ratio, Eigen::MatrixXd(null_damping.asDiagonal()))},
-          {"null_projector",
-           settings.null_projector == NullProjector::kKinematic ? "kinematic" : "dynamic"},
+          {"null_projector", name_of(settings.null_projector)},
           {"period", settings.period},
           {"delay", sampled.delay},
           {"cutoff", sampled.cutoff},

@@ -108,7 +108,8 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
         options.gains.frame == Frame::kBase ? impedance_.base : impedance_.tool;
     const int selected = static_cast<int>(tip.selected.sum());
     springs_ = std::min(n, checked_rank("task_stiffness", tip.stiffness));
-    springs_ += std::min(std::max(0, n - selected),
+    const bool unprojected = options.null_projector == NullProjector::kNone;
+    springs_ += std::min(std::max(0, n - (unprojected ? springs_ : selected)),
                          static_cast<int>((impedance_.null_stiffness.array() > 0).count()));
   }
   require(std::isfinite(options.soft_frequency) && options.soft_frequency > 0,
@@ -171,7 +172,9 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   NullSpace null_space(options_.null_projector);
   if (impedance.null_space()) {
     null_space.compute(robot, impedance);
-    if (kinematic() && null_space.of_projector().nearly_singular()) return audit(q).numbers;
+    if (!null_space.dynamic() && null_space.of_projector().nearly_singular()) {
+      return audit(q).numbers;
+    }
   }
   analysis::System<kMaxJoints> system;
   LoopSystem().form(robot, impedance, null_space, arm_.friction(), system);
@@ -237,10 +240,12 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
   result.task_damping = (tool ? impedance.tool : impedance.base).damping;
   result.damping = MatrixXd(arm_.friction().asDiagonal());
   if (!impedance.null_space() || n == 0) return result;
-  const auto projected = [&](const JointVector& gains) {
-    return analysis::null_space_damping(kinematic() ? MatrixXd::Identity(n, n) : result.mass,
-                                        *result.jacobian, *result.task_stiffness,
-                                        MatrixXd(gains.asDiagonal()));
+  const auto projected = [&](const JointVector& gains) -> analysis::NullSpaceDamping {
+    const MatrixXd D = gains.asDiagonal(), I = MatrixXd::Identity(n, n);
+    if (options_.null_projector == NullProjector::kNone) return {D, MatrixXd::Zero(n, n)};
+    return analysis::null_space_damping(
+        options_.null_projector == NullProjector::kDynamic ? result.mass : I, *result.jacobian,
+        *result.task_stiffness, D);
   };
   const analysis::NullSpaceDamping damping = projected(impedance.null_damping);
   *result.damping += damping.damping;

@@ -79,7 +79,7 @@ Impedance stated_impedance(const AuditOptions& stated, int n) {
     checked.directions[static_cast<std::size_t>(i)] =
         !checked.task_stiffness.row(i).isZero(0) || !checked.task_damping.row(i).isZero(0);
   }
-  return Impedance(setpoint, n);
+  return Impedance(setpoint, n, stated.null_projector);
 }
 
 AuditOptions audit_options(const Settings& settings) {

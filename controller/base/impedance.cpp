@@ -1,5 +1,7 @@
 #include <dashpot/controller/base/impedance.hpp>
 
+#include <utility>
+
 namespace dashpot::controller {
 namespace {
 
@@ -23,7 +25,8 @@ Impedance::Impedance(int n)
       joint_stiffness(JointMatrix::Zero(n, n)),
       joint_damping(JointMatrix::Zero(n, n)) {}
 
-Impedance::Impedance(const Setpoint& setpoint, int n) noexcept : Impedance(n) {
+Impedance::Impedance(const Setpoint& setpoint, int n, NullProjector projector) noexcept
+    : Impedance(n) {
   const Gains& gains = setpoint.gains;
   if (setpoint.mode == Mode::kJoint) {
     joint_weight = 1;
@@ -50,12 +53,17 @@ Impedance::Impedance(const Setpoint& setpoint, int n) noexcept : Impedance(n) {
   tip.stiffness = in_selected_directions(gains.task_stiffness);
   tip.damping = in_selected_directions(gains.task_damping);
   if (damping_ratio > 0) tip.damping = beside_springs(tip.stiffness, tip.damping);
-  if (n > tip.selected.sum()) {
+  const bool unprojected = projector == NullProjector::kNone;
+  if (unprojected || n > tip.selected.sum()) {
     if (gains.null_stiffness.size() == n) null_stiffness = gains.null_stiffness;
     null_damping_ratio = gains.null_damping_ratio;
     const bool springs = (null_stiffness.array() != 0).any();
     if (gains.null_damping.size() == n && !(springs && null_damping_ratio > 0)) {
       null_damping = gains.null_damping;
+    }
+    if (unprojected && springs && null_damping_ratio > 0 && damping_ratio > 0) {
+      null_damping_ratio = std::exchange(damping_ratio, 0);
+      common_ratio = 1;
     }
   }
 }
@@ -92,7 +100,8 @@ Impedance blend(const Impedance& a, const Impedance& b, double s) noexcept {
   };
   for (const auto number :
        {&Impedance::joint_weight, &Impedance::task_weight, &Impedance::damping_ratio,
-        &Impedance::joint_damping_ratio, &Impedance::null_damping_ratio}) {
+        &Impedance::joint_damping_ratio, &Impedance::null_damping_ratio,
+        &Impedance::common_ratio}) {
     c.*number = r * a.*number + s * b.*number;
   }
   for (const auto tip : {&Impedance::base, &Impedance::tool}) {

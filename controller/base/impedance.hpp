@@ -21,6 +21,7 @@ struct Impedance {
   double damping_ratio = 0;        ///< designed for the tip's springs, beside `damping`
   double joint_damping_ratio = 0;  ///< for the joints' springs, beside `joint_damping`
   double null_damping_ratio = 0;   ///< for the null space's springs, beside `null_damping`
+  double common_ratio = 0;         ///< share of the tip's springs that null_damping_ratio is for
   TipImpedance base;               ///< in B's axes
   TipImpedance tool;               ///< in T's axes
   JointVector null_stiffness;
@@ -32,10 +33,11 @@ struct Impedance {
   explicit Impedance(int n);
   /// The impedance that a set-point asks for, which is valid for n joints. Directions that are not
   /// selected have no springs and dampers. There are no null-space springs and dampers unless there
-  /// are more joints than selected directions. With a damping ratio the dampers given act only
-  /// where there is no spring: on joints and in directions whose row of the stiffness is zero, and
-  /// in the null space if all its stiffness is zero.
-  Impedance(const Setpoint& setpoint, int n) noexcept;
+  /// are more joints than selected directions, or no projector. With a damping ratio the dampers
+  /// given act only where there is no spring: on joints and in directions whose row of the
+  /// stiffness is zero, and in the null space if all its stiffness is zero.
+  Impedance(const Setpoint& setpoint, int n,
+            NullProjector projector = NullProjector::kDynamic) noexcept;
 
   /// Returns the share of the Cartesian springs in all active springs, 1 if there are no others.
   double task_share() const noexcept { return task_weight / (task_weight + joint_weight); }

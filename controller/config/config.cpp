@@ -100,9 +100,7 @@ class SettingsReader {
   }
   static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
                    NullProjector& value) {
-    static constexpr std::array<std::pair<std::string_view, NullProjector>, 2> kProjectors = {
-        {{"dynamic", NullProjector::kDynamic}, {"kinematic", NullProjector::kKinematic}}};
-    read_choice(keys, key, kProjectors, value);
+    read_choice(keys, key, kNullProjectors, value);
   }
   static void read(const text::YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
                    Energy::From& value) {
@@ -253,6 +251,17 @@ Config read_config(const text::YamlNode& document, const std::filesystem::path& 
   read_walls(reader.section("limits"), settings.limits.walls);
   check(settings, model, document);
   return {robot, model, settings, unused(document, settings.initial.mode)};
+}
+
+void read_null_projector(const text::YamlMapping& root, const RobotModel& model,
+                         NullProjector& projector) {
+  Settings settings;
+  settings.null_projector = projector;
+  SettingsReader reader(root, model);
+  for_each_setting(settings, [&](const Setting& setting, auto& value) {
+    if (std::string_view(setting.key).starts_with("control.null_")) reader(setting, value);
+  });
+  projector = settings.null_projector;
 }
 
 Config load_config(const std::string& path) try {

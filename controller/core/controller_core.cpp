@@ -274,7 +274,8 @@ void ControllerCore::show() noexcept {
   shown.tip_error = asked_.tip_error;
   shown.tip_wrench = asked_.tip_wrench;
   shown.joint_damping_ratio = impedance.joint_damping_ratio;
-  shown.task_damping_ratio = impedance.damping_ratio;
+  shown.task_damping_ratio =
+      impedance.damping_ratio + impedance.common_ratio * impedance.null_damping_ratio;
   shown.damping_level = level_.level;
   if (tank_.on()) shown.energy_store = tank_.level();
   shown.spring_share = tank_.share();

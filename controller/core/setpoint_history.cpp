@@ -54,18 +54,19 @@ SetpointHistory::News SetpointHistory::take(const Setpoint& setpoint, std::int64
   if (same) return News::kGoal;
   accepted_.mode = setpoint.mode;
   accepted_.gains = setpoint.gains;
-  gains_.set_target(Impedance(accepted_, n_));
+  gains_.set_target(Impedance(accepted_, n_, settings_.null_projector));
   return News::kGains;
 }
 
 void SetpointHistory::restart(const Sensed& now) noexcept {
-  const Impedance target(accepted_, n_);
+  const Impedance target(accepted_, n_, settings_.null_projector);
   Impedance none(n_);
   none.base.selected = target.base.selected;
   none.tool.selected = target.tool.selected;
   none.damping_ratio = target.damping_ratio;  // of springs that grow from zero
   none.joint_damping_ratio = target.joint_damping_ratio;
   none.null_damping_ratio = target.null_damping_ratio;
+  none.common_ratio = target.common_ratio;
   gains_.start(none);
   gains_.set_target(target);
   wrench_.start(Vector6::Zero());

@@ -121,9 +121,13 @@ void ImpedanceLaw::add_null_torque(const Input& now, LawTorque& result) noexcept
   dq = difference(posture.position(), now.q);
   const JointVector share = null_space.explained(result.tip_error);
   add(share, dq, -1 / std::sqrt(1 + product(share, share) / (kPostureShare * kPostureShare)));
-  const JointVector dqd = difference(posture.velocity(), now.qd);
+  JointVector dqd = difference(posture.velocity(), now.qd);
   add(null_space.spring(impedance.null_stiffness, dq), result.torque);
   add(null_space.damper(impedance.null_damping, dqd), result.dampers);
+  if (impedance.common_ratio > 0) {
+    const Vector6 left = now.references.tip.velocity() - twist(now.robot.J, posture.velocity());
+    add(null_space.joint_velocity(left), dqd, impedance.common_ratio);
+  }
   if (impedance.null_damping_ratio > 0) add(null_space.ratio_damper(dqd), result.dampers);
 }
 

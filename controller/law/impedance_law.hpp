@@ -43,7 +43,9 @@ struct LawTorque {
 /// FeedForward::friction_share times this with FeedForward::friction_rise for 0.01 rad/s. J# e is
 /// the part of q_0 - q that a deflection of the tip explains. It is subtracted, because otherwise
 /// deflections of the tip would drive the self-motion, and the stiffness of the loop would not be
-/// symmetric. It counts fully while it is small: s = 1 / sqrt(1 + (|J# e| / 0.3 rad)^2). Every term
+/// symmetric. It counts fully while it is small: s = 1 / sqrt(1 + (|J# e| / 0.3 rad)^2). Without a
+/// projector N = I and J# = 0; damping for a ratio that all springs have then acts on the velocity
+/// error of joints that move the tip at V_d, qd_0 + M^-1 J' Lambda (V_d - J qd_0) - qd. Every term
 /// of the last column can be left out, see FeedForward.
 ///
 /// K_C acts on e within the error clamp (see ErrorClamp): a tip that is further away is pulled no

@@ -21,21 +21,21 @@ void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
     A.noalias() += y * y.transpose();
   }
   inertia_.compute(A, impedance.base, impedance.tool, robot.R_BT);
-  if (kinematic_) {
-    J_ = robot.J;
+  if (!dynamic()) J_ = robot.J;
+  if (projector_ == NullProjector::kKinematic) {
     unit_inertia_.compute(J_ * J_.transpose(), impedance.base, impedance.tool, robot.R_BT);
   }
   level_ = {};
   ratio_damping_.resize(0, 0);
   if (impedance.null_damping_ratio > 0 && impedance.null_space()) {
-    damp(impedance.null_stiffness, {impedance, borne, level_});
+    damp(robot.R_BT, {impedance, borne, level_});
   }
 }
 
 JointVector NullSpace::spring(const JointVector& k, const JointVector& dq) const noexcept {
   JointVector y(dq.size());
   for (Eigen::Index i = 0; i < dq.size(); ++i) y[i] = k[i] * dq[i];
-  if (kinematic_) {
+  if (!dynamic()) {
     project_joints(y);
     return y;
   }
@@ -47,7 +47,7 @@ JointVector NullSpace::spring(const JointVector& k, const JointVector& dq) const
 
 JointVector NullSpace::projected_velocity(const JointVector& dq) const noexcept {
   JointVector y = dq;
-  if (kinematic_) {
+  if (!dynamic()) {
     project_joints(y);
     return y;
   }
@@ -65,21 +65,29 @@ JointVector NullSpace::projected_acceleration(const JointVector& torque) const n
   return y;
 }
 
-void NullSpace::damp(const JointVector& k, const Damping& damping) noexcept {
+void NullSpace::damp(const Eigen::Matrix3d& R_BT, const Damping& damping) noexcept {
+  const Impedance& impedance = damping.impedance;
+  const JointVector& k = impedance.null_stiffness;
   const Eigen::Index n = k.size();
   JointMatrix& D = ratio_damping_;
   D.resize(n, n);
-  if (damp_one_motion(k, damping)) return;
+  if (!unprojected() && damp_one_motion(k, damping)) return;
+  Matrix6 K_C = Matrix6::Zero();
+  if (impedance.common_ratio > 0) {
+    K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, R_BT);
+    K_C *= impedance.common_ratio;
+  }
   std::array<JointVector, kMaxJoints> velocity;  // columns of L^-T P
   for (Eigen::Index j = 0; j < n; ++j) {
     JointVector& y = velocity[static_cast<std::size_t>(j)];
     y.setZero(n);
     y[j] = 1;
-    project(y);
+    if (!unprojected()) project(y);
     mass_.solve_LT(y.data());
+    const Vector6 pull = K_C * Jh_.col(j);  // of a P = I
     for (Eigen::Index i = 0; i <= j; ++i) {
       const JointVector& x = velocity[static_cast<std::size_t>(i)];
-      double sum = 0;
+      double sum = Jh_.col(i).dot(pull);
       for (Eigen::Index l = 0; l < n; ++l) sum += k[l] * x[l] * y[l];
       D(i, j) = D(j, i) = sum;
     }
@@ -132,7 +140,7 @@ JointVector NullSpace::ratio_damper(const JointVector& dqd) const noexcept {
 }
 
 JointVector NullSpace::explained(const Vector6& e) const noexcept {
-  if (!kinematic_) return joint_velocity(e);
+  if (dynamic()) return joint_velocity(e);
   JointVector dq = JointVector::Zero(J_.cols());
   add_torque(J_, unit_inertia_.wrench(e), dq);
   return dq;

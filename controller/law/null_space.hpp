@@ -25,10 +25,14 @@ namespace dashpot::controller {
 /// N leaves the same motions free; but a torque N t accelerates the tip, because N is orthogonal in
 /// joint coordinates and not in energy. All else is as above: the damping for a ratio, the joint
 /// velocity of a twist, the inertia.
+///
+/// NullProjector::kNone has N = I: its springs and dampers are those of joints, which act on the
+/// tip as well. The damping for a ratio has P = I, and, with Impedance::common_ratio, K_0 + J' K_C J
+/// for K_0.
 class NullSpace {
  public:
   explicit NullSpace(NullProjector projector = NullProjector::kDynamic) noexcept
-      : kinematic_(projector == NullProjector::kKinematic) {}
+      : projector_(projector) {}
 
   /// Computes the null space of the directions that an impedance selects, and, if it has null-space
   /// springs and a ratio for them, the damping D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, in
@@ -61,10 +65,16 @@ class NullSpace {
   /// Returns M^-1 J' H G^-1 H V: the joint velocity of least kinetic energy with which the tip
   /// moves at `twist` in the selected directions.
   JointVector joint_velocity(const Vector6& twist) const noexcept;
+  /// Returns H G^-1 H J M^-1 t: the wrench at the tip that accelerates it as a joint torque does.
+  Vector6 wrench_of(JointVector torque) const noexcept {
+    mass_.solve_L(torque.data());
+    return inertia_.wrench(twist(Jh_, torque));
+  }
   const TaskInertia& inertia() const noexcept { return inertia_; }
-  bool kinematic() const noexcept { return kinematic_; }
-  /// Returns the inertia, or, for a kinematic projector, its counterpart with I for M.
-  const TaskInertia& of_projector() const noexcept { return kinematic_ ? unit_inertia_ : inertia_; }
+  bool dynamic() const noexcept { return projector_ == NullProjector::kDynamic; }
+  bool unprojected() const noexcept { return projector_ == NullProjector::kNone; }
+  /// Returns the inertia, or, of another projector, what is in its place, with I for M.
+  const TaskInertia& of_projector() const noexcept { return dynamic() ? inertia_ : unit_inertia_; }
   /// Returns L.
   const SmallCholesky& mass() const noexcept { return mass_; }
   /// Replaces y by P y.
@@ -73,7 +83,7 @@ class NullSpace {
   }
 
  private:
-  /// Replaces dq by N dq of the kinematic projector.
+  /// Replaces dq by N dq of a projector that is not dynamic.
   void project_joints(JointVector& dq) const noexcept {
     add_torque(J_, -unit_inertia_.wrench(twist(J_, dq)), dq);
   }
@@ -88,13 +98,13 @@ class NullSpace {
       return wanted * borne.share(omega, wanted, impedance.task_share(), level);
     }
   };
-  void damp(const JointVector& k, const Damping& damping) noexcept;
+  void damp(const Eigen::Matrix3d& R_BT, const Damping& damping) noexcept;
   /// Sets D if P is a projector on one motion; returns false if not.
   bool damp_one_motion(const JointVector& k, const Damping& damping) noexcept;
 
-  bool kinematic_;
+  NullProjector projector_;
   TaskInertia inertia_;
-  TaskInertia unit_inertia_;  ///< of a kinematic projector, as is J_
+  TaskInertia unit_inertia_;  ///< of a kinematic projector, as is J_; zero without one
   Jacobian J_;
   SmallCholesky mass_;
   Jacobian Jh_;

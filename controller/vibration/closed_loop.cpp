@@ -105,7 +105,8 @@ JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& i
   const Matrix6& K_B = impedance.base.stiffness;
   const Matrix6 K_T = turned(impedance.tool.stiffness, robot.R_BT);
   const Matrix6 K_C = K_B + K_T;
-  const Vector6 wanted = -impedance.task_weight * (wrenches.world + wrenches.commanded);
+  const Vector6 wanted =
+      -impedance.task_weight * (wrenches.world + wrenches.commanded) - wrenches.posture;
   Vector6 e = deflection(K_C, wanted);
   const Vector6 F = K_C * e;  // the part that K_C can hold
   const double angle = e.tail<3>().norm();
@@ -202,28 +203,34 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Actin
   const bool loaded = terms.load != Load::kIgnored && !acting.wrenches.world.isZero(0);
   JointMatrix extra = JointMatrix::Zero(n, n);
   std::optional<NullSpaceChange> change;
+  TipWrenches wrenches = acting.wrenches;
   if (acting.posture && impedance.null_space() && (loaded || terms.jacobian_rate)) {
-    change.emplace(*acting.posture->kernel, *acting.posture->q, robot, null_space,
-                   !impedance.tool.none(), null_space.kinematic());
+    if (null_space.unprojected()) {
+      wrenches.posture = null_space.wrench_of(
+          impedance.null_stiffness.cwiseProduct(acting.posture->error));
+    } else {
+      change.emplace(*acting.posture->kernel, *acting.posture->q, robot, null_space,
+                     !impedance.tool.none(), null_space.dynamic());
+    }
   }
   if (loaded) {
     std::optional<LoadedPosture> pulled;
     if (change && !impedance.null_stiffness.isZero(0)) {
       pulled.emplace(LoadedPosture{*change, acting.posture->error});
     }
-    extra = stiffness_under_load(robot, acting.impedance, terms.load, acting.wrenches,
+    extra = stiffness_under_load(robot, acting.impedance, terms.load, wrenches,
                                  pulled ? &*pulled : nullptr);
   }
   if (terms.jacobian_rate) {
     add_congruence(J, C_C, jacobian_rate(J, qd), extra);
     if (change && !D.isZero(0)) {
       const JointVector past = difference(qd, acting.posture->velocity);
-      if (null_space.kinematic() && impedance.null_damping_ratio > 0) {
+      if (!null_space.dynamic() && impedance.null_damping_ratio > 0) {
         JointMatrix designed = JointMatrix::Zero(n, n);
         add_null_damping(null_space, designed);
         D -= designed;
         const NullSpaceChange dynamic(*acting.posture->kernel, *acting.posture->q, robot,
-                                      null_space, !impedance.tool.none(), false);
+                                      null_space, !impedance.tool.none(), true);
         add_null_space_rate(dynamic, J, past, designed, extra);
       }
       add_null_space_rate(*change, J, past, D, extra);

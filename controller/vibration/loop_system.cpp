@@ -134,7 +134,7 @@ bool LoopSystem::add_free_motions(const Impedance& impedance, const NullSpace& n
 void LoopSystem::add_null_space(const Impedance& impedance, const NullSpace& null_space,
                                 JointMatrix& C) noexcept {
   const int selected = selected_directions(impedance.base, impedance.tool);
-  if (!null_space.kinematic() && selected >= 0 && selected < n_ &&
+  if (null_space.dynamic() && selected >= 0 && selected < n_ &&
       !null_space.inertia().nearly_singular() &&
       add_free_motions(impedance, null_space, n_ - selected, C)) {
     return;

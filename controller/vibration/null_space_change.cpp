@@ -10,22 +10,22 @@ using Eigen::Vector3d;
 
 NullSpaceChange::NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q,
                                  const DynamicsResult& robot, const NullSpace& null_space,
-                                 bool in_tool_axes, bool kinematic) noexcept
-    : tool_(in_tool_axes), kinematic_(kinematic), J_(robot.J), mass_(kernel, q, robot.J) {
+                                 bool in_tool_axes, bool dynamic) noexcept
+    : tool_(in_tool_axes), dynamic_(dynamic), J_(robot.J), mass_(kernel, q, robot.J) {
   const Index n = J_.cols();
   share_.resize(n, 6);
-  const TaskInertia& inertia = kinematic_ ? null_space.of_projector() : null_space.inertia();
+  const TaskInertia& inertia = dynamic_ ? null_space.inertia() : null_space.of_projector();
   for (Index i = 0; i < 6; ++i) {
     const Vector6 unit = Vector6::Unit(i);
     inertia_.col(i) = inertia.wrench(unit);
-    share_.col(i) = kinematic_ ? null_space.explained(unit) : null_space.joint_velocity(unit);
+    share_.col(i) = dynamic_ ? null_space.joint_velocity(unit) : null_space.explained(unit);
   }
   tip_torque_ = J_.transpose().lazyProduct(inertia_);
   mobility_.resize(n, n);
   for (Index i = 0; i < n; ++i) {
     const JointVector unit = JointVector::Unit(n, i);
     mobility_.col(i) =
-        kinematic_ ? null_space.projected_velocity(unit) : null_space.projected_acceleration(unit);
+        dynamic_ ? null_space.projected_acceleration(unit) : null_space.projected_velocity(unit);
   }
   torque_projector_ = JointMatrix::Identity(n, n);
   torque_projector_ -= J_.transpose().lazyProduct(share_.transpose());
@@ -35,9 +35,9 @@ NullSpaceChange::NullSpaceChange(const DynamicsKernel& kernel, const JointVector
 
 void NullSpaceChange::set_spread(const NullSpace& null_space) noexcept {
   const Index n = J_.cols();
-  const TaskInertia& inertia = kinematic_ ? null_space.of_projector() : null_space.inertia();
+  const TaskInertia& inertia = dynamic_ ? null_space.inertia() : null_space.of_projector();
   moved_ = J_.transpose();
-  for (Index i = 0; i < 6 && !kinematic_; ++i) {
+  for (Index i = 0; i < 6 && dynamic_; ++i) {
     null_space.mass().solve_L(&moved_(0, i));
     null_space.mass().solve_LT(&moved_(0, i));
   }
@@ -58,8 +58,7 @@ void NullSpaceChange::set_spread(const NullSpace& null_space) noexcept {
 }
 
 JointMatrix NullSpaceChange::inert(const JointVector& x) const noexcept {
-  if (kinematic_) return JointMatrix::Zero(x.size(), x.size());
-  return mass_.times(x);
+  return dynamic_ ? mass_.times(x) : JointMatrix::Zero(x.size(), x.size());
 }
 
 Vector6 NullSpaceChange::turning(const Vector6& V, Index k) const noexcept {

@@ -22,7 +22,7 @@ class NullSpaceChange {
   /// `robot` and `null_space` come from the kernel at `q`. The projector is the one of `null_space`
   /// or the dynamic one.
   NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q, const DynamicsResult& robot,
-                  const NullSpace& null_space, bool in_tool_axes, bool kinematic) noexcept;
+                  const NullSpace& null_space, bool in_tool_axes, bool dynamic) noexcept;
 
   /// Returns d(J# V)/dq, n x n, for a V that is constant in the axes of the selected directions.
   JointMatrix of_joint_velocity(const Vector6& V) const noexcept;
@@ -44,7 +44,7 @@ class NullSpaceChange {
   JointMatrix inert(const JointVector& x) const noexcept;
 
   bool tool_;
-  bool kinematic_;
+  bool dynamic_;
   Jacobian J_;
   MassChange mass_;
   Matrix6 inertia_;                         ///< G

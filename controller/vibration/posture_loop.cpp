@@ -198,7 +198,7 @@ Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode m
   Setpoint setpoint;
   setpoint.mode = mode;
   setpoint.gains = gains;
-  const GainBlend given(1, Impedance(setpoint, n));
+  const GainBlend given(1, Impedance(setpoint, n, settings_.null_projector));
   damping_.reset();
   const Impedance& impedance = damping_.update(given, robot);
   level_ = damping_.level(given.now());

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ._core import Error, Gains
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers
-from ._robot import DIRECTIONS, Robot, check_postures, gains_text, is_kinematic, selected
+from ._robot import DIRECTIONS, Robot, check_postures, gains_text, known_projector, selected
 from ._workers import Task, chunks_of, collect, workers
 
 
@@ -208,7 +208,7 @@ def _task(robot: Robot, *, task_stiffness: npt.ArrayLike | None = None,
         joint_damping=_damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"),
         null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
-                               "kinematic_null_space": is_kinematic(null_projector),
+                               "null_projector": known_projector(null_projector),
                                "period": float(period), "delay": delay, "cutoff": float(cutoff),
                                "difference_velocity": difference_velocity,
                                "integral_time": float(integral_time),
@@ -256,7 +256,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     entry. With `half_quaternion` the controller's error is half of the rotation vector; with
     `inertia_blocks` it multiplies gains by the tip's inertia, separately for translation and
     rotation; with a `null_projector` of "kinematic" instead of "dynamic" null-space gains act through
-    I - J^+ J. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
+    I - J^+ J, with "none" in all joints. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
     (Hz; 0: none), `difference_velocity`, and an integral of the springs with `integral_time` (s; 0:
     none), which affects only the gain margin. The torque against gravity is as late as the rest,
     unless it is `ideal_gravity`, as of a robot that holds itself. If the robot lacks reflected

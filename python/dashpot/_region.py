@@ -78,7 +78,6 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     gains = gains_text(joint_stiffness=joint_stiffness, task_stiffness=task_stiffness,
                        null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": False,
-                               "kinematic_null_space": False,
                                "period": float(period), "delay": int(delay),
                                "cutoff": float(cutoff),
                                "difference_velocity": bool(difference_velocity),

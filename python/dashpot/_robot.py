@@ -18,6 +18,7 @@ from ._core import Error
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+PROJECTORS = ("dynamic", "kinematic", "none")
 LOADS = ("base_wrench", "tool_wrench", "joint_torques")
 
 
@@ -329,11 +330,11 @@ def one_damping(part: str, stiffness: npt.ArrayLike | None, damping: npt.ArrayLi
                     f"{part}_stiffness; {part}_damping = zeros is a loop without damping")
 
 
-def is_kinematic(null_projector: str) -> bool:
-    """Returns whether null_projector is the projector of the pseudo-inverse."""
-    if null_projector not in ("dynamic", "kinematic"):
-        raise Error(f"null_projector: {null_projector!r} is not one of dynamic, kinematic")
-    return null_projector == "kinematic"
+def known_projector(null_projector: str) -> str:
+    """Returns the name of a projector of the null space."""
+    if null_projector not in PROJECTORS:
+        raise Error(f"null_projector: {null_projector!r} is not one of {', '.join(PROJECTORS)}")
+    return null_projector
 
 
 def selected(directions: Sequence[str]) -> list[bool]:
@@ -401,10 +402,11 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     Matrices are symmetric positive semidefinite, and may be given as their diagonals. With
     `joint_stiffness` or `joint_damping` (n x n) springs are fixed to a joint position, otherwise to
     a pose of the tip, with `task_stiffness` K_C and `task_damping` C_C (6 x 6, in the axes of
-    `frame`, base or tool). `null_stiffness` and `null_damping` (n each) act in the motions that the
-    selected `directions` leave free, through the dynamically consistent projector or,
-    with a `null_projector` of "kinematic", the projector of the pseudo-inverse. If a damping ratio
-    is above 0, the damping is designed for it; the robot's viscous friction is added, and changes
+    `frame`, base or tool). In the motions that the selected `directions` leave free act
+    `null_stiffness` and `null_damping` (n each), through the dynamically consistent projector or,
+    with a `null_projector` of "kinematic", the projector of the pseudo-inverse; with "none" they act
+    in all joints, and one ratio of tip and null space is the tip's, of all springs. A damping ratio
+    above 0 has the damping designed for it; the robot's viscous friction comes on top, and moves
     the ratios. The springs hold an `external_wrench` (6, of the world on the tip, in the base's
     axes) at q; `load` says how it moves with the arm, which adds stiffness: base_wrench,
     tool_wrench (it turns with the tip), joint_torques (its joint torques are constant).
@@ -414,7 +416,7 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     """
     if load not in LOADS:
         raise Error(f"load: {load!r} is not one of {', '.join(LOADS)}")
-    kinematic = is_kinematic(null_projector)
+    projector = known_projector(null_projector)
     kind = 0 if external_wrench is None else 1 + LOADS.index(load)
     at_tip = joint_stiffness is None and joint_damping is None and joint_damping_ratio == 0
     if not at_tip and not (task_stiffness is None and task_damping is None):
@@ -436,6 +438,6 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
         warnings.warn(doubt, stacklevel=2)
     found = _core.closed_loop(robot._core, posture, gains, at_tip,
                               to_vector("external_wrench", external_wrench), kind, soft_frequency,
-                              kinematic)
+                              projector)
     return ClosedLoop(found["mass"], found["damping"], found["stiffness"],
                       make_modes(found["modes"]))

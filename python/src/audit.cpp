@@ -42,9 +42,9 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   };
   take("half_quaternion", options.half_quaternion);
   take("inertia_blocks", options.inertia_blocks);
-  bool kinematic = false;
-  take("kinematic_null_space", kinematic);
-  if (kinematic) options.null_projector = controller::NullProjector::kKinematic;
+  std::string projector;
+  take("null_projector", projector);
+  options.null_projector = controller::null_projector_of(projector);
   take("period", options.period);
   take("delay", options.delay);
   take("cutoff", options.cutoff);

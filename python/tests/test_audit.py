@@ -101,6 +101,11 @@ def test_a_kinematic_null_space_acts_through_the_pseudo_inverse(panda):
             dashpot.closed_loop(panda, q, **damped, null_projector="both")
         other = dashpot.audit(panda, q, **GAINS, **null_space).posture
         assert abs(other.fastest_pole / values.real.min() - 1) > 1e-3
+        both = dashpot.closed_loop(panda, q, **damped, **null_space, null_projector="none")
+        np.testing.assert_allclose(both.stiffness, J.T @ K_C @ J + 10 * np.eye(7), atol=1e-9 * abs(K).max())
+        both = dashpot.closed_loop(panda, q, task_stiffness=GAINS["task_stiffness"], task_damping_ratio=0.6,
+                                   null_stiffness=[10.0] * 7, null_damping_ratio=0.6, null_projector="none")
+        np.testing.assert_allclose(both.modes.damping_ratio[both.modes.natural_frequency > 10], 0.6, atol=0.02)
 
 
 def test_workspaces_are_the_same_with_any_executor(panda):

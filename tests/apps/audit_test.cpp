@@ -49,6 +49,22 @@ TEST(Audit, ReproducesWhatIsKnownOfPublicControllers) {
   }
 }
 
+/// Polymetis has springs and dampers in the joints as well: K = J' K_C J + K_J.
+TEST(Audit, HasTheSpringsOfTipAndJointsOfPolymetis) {
+  const Json found = audit_json({"--preset", "polymetis"});
+  EXPECT_TRUE(found["intended_ratio"].is_null());
+  const Words joints = {"--null-stiffness", "40,30,50,25,35,25,10", "--null-damping",
+                        "4,6,5,5,3,2,1",    "--null-projector",     "none"};
+  const Words tip = {"--stiffness", "750,750,750,15,15,15", "--damping", "37,37,37,2,2,2"};
+  const Json stated = audit_json(joined(tip, joints));
+  EXPECT_EQ(found["posture"]["modes"], stated["posture"]["modes"]);
+  EXPECT_EQ(found["posture"]["modes"].size(), 7U);
+  EXPECT_THAT(run_program({"audit", "--preset", "polymetis", "--urdf", testing::arm_path("ur5"),
+                           "--base", "base_link", "--tip", "ee_link"})
+                  .err,
+              HasSubstr("polymetis has gains for seven joints, the arm has 6"));
+}
+
 /// Its slowest mode, 2.386 rad/s with a ratio of 0.25, is unstable with an integral below 0.84 s.
 TEST(Audit, CountsAnIntegralAndTellsHowItsSlowModesDecay) {
   const std::vector<std::string> options = {"--preset", "deoxys",    "--period",

@@ -186,6 +186,21 @@ TEST_F(AuditOfPanda, TakesTheProjectorOfThePseudoInverse) {
   }
 }
 
+TEST_F(AuditOfPanda, TakesSpringsOfTipAndJointsAtOnce) {
+  options.gains.null_stiffness = JointVector::LinSpaced(7, 40, 10);
+  options.gains.null_damping = JointVector::LinSpaced(7, 6, 1);
+  options.null_projector = NullProjector::kNone;
+  const Audit audit(model, options);
+  for (int k = 0; k < 50; ++k) {
+    const JointVector q = audit.posture(1, k);
+    TaskLoop loop = loop_at(model, q, options);
+    loop.stiffness += options.gains.null_stiffness.asDiagonal();
+    loop.damping += options.gains.null_damping.asDiagonal();
+    expect_numbers(audit.numbers(q), loop, 1e-8);
+    expect_numbers(audit.audit(q).numbers, loop, 1e-8);
+  }
+}
+
 TEST_F(AuditOfPanda, NamesASingularPosture) {
   JointVector stretched = home;
   stretched[1] = stretched[3] = stretched[5] = 0;

@@ -56,8 +56,10 @@ TEST(Realtime, UpdateNeverAllocates) {
   EXPECT_GE(allocations_of([] { ::operator delete(::operator new(100)); }), 1);
   DrivenPanda arm(Analysis::Where::kInline, 100, 0.02);
   EXPECT_EQ(allocations_of([&] { arm.run(150'000), arm.controller->reset(); }), 0);
-  DrivenPanda kinematic(Analysis::Where::kInline, 10, 0.02, NullProjector::kKinematic);
-  EXPECT_EQ(allocations_of([&] { kinematic.run(20'000); }), 0);
+  for (const NullProjector projector : {NullProjector::kKinematic, NullProjector::kNone}) {
+    DrivenPanda other(Analysis::Where::kInline, 10, 0.02, projector);
+    EXPECT_EQ(allocations_of([&] { other.run(20'000); }), 0);
+  }
 }
 
 /// With the spectrum in every tick, followed and solved directly, and on a thread.

@@ -127,6 +127,39 @@ TEST(DesignedDamping, HoldsTheRatioAlongAPathOfEveryArm) {
   }
 }
 
+/// Springs of the tip and, without a projector, of all joints have the task's ratio together.
+TEST(DesignedDamping, HoldsOneRatioOfSpringsAtTheTipAndInTheJoints) {
+  for (const testing::Arm& arm : testing::arms()) {
+    SCOPED_TRACE(arm.file);
+    const RobotModel model = testing::smooth_arm(arm);
+    Settings settings = plain_settings(model, Mode::kCartesian);
+    settings.null_projector = NullProjector::kNone;
+    Gains& gains = settings.initial.gains;
+    gains.task_damping_ratio = 0.4;
+    gains.null_damping_ratio = 0.7;
+    gains.null_stiffness.setConstant(30);
+    LedArm led(model, settings);
+    led.settle();
+    for (int k = 1; k <= 200; ++k) {
+      led.swing(3e-3 * k);
+      ASSERT_LE(led.tick(), Status::kNearJointLimit);
+      ASSERT_EQ(led.modes().count, model.dof());
+      EXPECT_LE(worst_ratio(led.modes(), 0.4), 1e-6) << "tick " << k;
+    }
+    EXPECT_EQ(led.controller.snapshot().task_damping_ratio, 0.4);
+    led.setpoint.gains.task_damping_ratio = 0;  // each by itself
+    led.setpoint.gains.task_damping.setZero();
+    led.settle();
+    const DynamicsResult robot =
+        evaluate(model, led.state.position, JointVector::Zero(model.dof()));
+    const Eigen::LLT<MatrixXd> L{MatrixXd(robot.M)};
+    const MatrixXd inverse = MatrixXd(L.matrixL()).inverse();
+    const MatrixXd K = 30 * inverse * inverse.transpose();
+    const MatrixXd root = Eigen::SelfAdjointEigenSolver<MatrixXd>(K).operatorSqrt();
+    EXPECT_TRUE(near(inverse * led.damping() * inverse.transpose(), 1.4 * root, 1e-9 * root.norm()));
+  }
+}
+
 TEST(DesignedDamping, LosesNoModesOfALongChain) {
   // Modes near each other were lost once.
   testing::RandomRobot random(20210001);

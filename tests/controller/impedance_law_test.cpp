@@ -162,7 +162,7 @@ void expect_task_law(const RobotModel& model, Random& random,
   int held = 0;
   for (bool& direction : gains.directions) held += direction = random.integer(0, 4) > 0;
   if (held == 0) return;
-  const Impedance impedance(setpoint, n);
+  const Impedance impedance(setpoint, n, kind);
 
   // Rows of selected directions: S maps a twist in B's axes to their components.
   MatrixXd turn = MatrixXd::Identity(6, 6);
@@ -182,9 +182,12 @@ void expect_task_law(const RobotModel& model, Random& random,
                  C_C = held_only * gains.task_damping * held_only.transpose();
   const TipReference& path = one.references.tip;
   VectorXd tau = J.transpose() * (K_C * one.tip_error() + C_C * (path.velocity() - J * one.qd));
-  if (n > held) {
-    const MatrixXd of_angles = JS.transpose() * MatrixXd(JS * JS.transpose()).inverse();
-    const MatrixXd& inverse = kind == NullProjector::kDynamic ? pseudo : of_angles;
+  if (n > held || kind == NullProjector::kNone) {
+    MatrixXd inverse = MatrixXd::Zero(n, held);
+    if (kind == NullProjector::kDynamic) inverse = pseudo;
+    if (kind == NullProjector::kKinematic) {
+      inverse = JS.transpose() * MatrixXd(JS * JS.transpose()).inverse();
+    }
     const MatrixXd projector = MatrixXd::Identity(n, n) - inverse * JS;
     const JointReference& rest = one.references.posture;
     VectorXd share = inverse * S * one.tip_error();
@@ -211,6 +214,41 @@ TEST(CartesianImpedance, IsItsEquation) {
     expect_task_law(rough_chain(random, 14), random);
     expect_task_law(testing::arm_model(testing::arms()[0]), random, NullProjector::kKinematic);
     expect_task_law(rough_chain(random, 9), random, NullProjector::kKinematic);
+    expect_task_law(testing::arm_model(testing::arms()[2]), random, NullProjector::kNone);
+    expect_task_law(rough_chain(random, 9), random, NullProjector::kNone);
+  }
+}
+
+// Where tip and joints move as their references, no damping for a ratio brakes them.
+TEST(CartesianImpedance, DampsTheErrorOfTheTipsVelocityForTheRatioOfAllSprings) {
+  Random random(327);
+  for (int k = 0; k < 20; ++k) {
+    Case one(rough_chain(random, 7), random);
+    one.projector = NullProjector::kNone;
+    Setpoint setpoint;
+    setpoint.mode = Mode::kCartesian;
+    setpoint.gains = random_gains(random, 7);
+    setpoint.gains.task_damping_ratio = setpoint.gains.null_damping_ratio = 0.7;
+    const Impedance impedance(setpoint, 7, one.projector);
+    NullSpace null_space(one.projector);
+    null_space.compute(one.robot, impedance);
+    if (null_space.inertia().nearly_singular()) continue;
+    const JointVector& rest = one.references.posture.velocity();
+    const MatrixXd M = one.robot.M, J = one.robot.J;
+    const MatrixXd A = J * M.inverse() * J.transpose();
+    one.qd = rest + JointVector(M.inverse() * J.transpose() * A.inverse() *
+                                (one.references.tip.velocity() - J * rest));
+    const auto dampers = [&] {
+      ImpedanceLaw law(one.model, kNone);
+      LawTorque result;
+      law.torque({one.robot, one.q, one.qd, impedance, null_space, one.references, kEndless,
+                  Vector6::Zero()},
+                 result);
+      return result.dampers.norm();
+    };
+    const double still = dampers();
+    one.qd = rest;
+    EXPECT_LT(still, 1e-8 * dampers());
   }
 }
 

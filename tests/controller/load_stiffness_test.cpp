@@ -60,8 +60,9 @@ struct HeldLoad {
     kernel.evaluate(there, rest, result);
     return result;
   }
-  /// Moves the springs' rest so that they hold the load. Returns the error e there.
-  Vector6 hold() {
+  /// Moves the springs' rest so that they hold the load, with the posture's springs deflected by p.
+  /// Returns the error e there.
+  Vector6 hold(const JointVector& p = JointVector::Zero(7)) {
     const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
     Vector6 e = Vector6::Zero();
     if (impedance.task_weight > 0 && !K_C.isZero(0)) {
@@ -71,11 +72,12 @@ struct HeldLoad {
       Eigen::CompleteOrthogonalDecomposition<Matrix6> solved;
       solved.setThreshold(1e-10);
       solved.compute(unit.asDiagonal() * K_C * unit.asDiagonal());
-      e = -impedance.task_weight * unit.cwiseProduct(Vector6(solved.solve(
-                                       unit.cwiseProduct(wrenches.world + wrenches.commanded))));
+      const Vector6 load =
+          impedance.task_weight * (wrenches.world + wrenches.commanded) + wrenches.posture;
+      e = -unit.cwiseProduct(Vector6(solved.solve(unit.cwiseProduct(load))));
     }
     references.joint.start(q);
-    references.posture.start(q);
+    references.posture.start(q + p);
     references.tip.start(robot.p_BT_B + e.head<3>(),
                          quaternion(Eigen::Vector3d(e.tail<3>())) * Quaterniond(robot.R_BT));
     return e;
@@ -127,7 +129,7 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
   for (int k = 0; k < 60; ++k) {
     HeldLoad held(random);
     const bool loaded = k % 5 > 0;
-    if (k % 2 == 1) held.projector = NullProjector::kKinematic;
+    held.projector = kNullProjectors[k % kNullProjectors.size()].second;
     Setpoint setpoint;
     setpoint.gains = springs(random);
     if (!loaded) {  // the loop as it is analysed: null space and dampers, too
@@ -192,14 +194,17 @@ TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
       setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
       if (k % 4 > 1) setpoint.gains.directions[static_cast<std::size_t>(k / 4)] = false;
       held.impedance = Impedance(setpoint, 7);
-      if (k % 8 > 3) held.projector = NullProjector::kKinematic;
+      held.projector = kNullProjectors[k / 4 % kNullProjectors.size()].second;
       if (k % 3 == 0) held.approach_singularity(random);
-      // Beyond 2 rad a deflection counts as one of 2 rad.
-      if (const Vector6 e = held.hold(); e.tail<3>().norm() > 2) continue;
-      held.references.posture.start(held.q + JointVector(0.2 * random.vector(7)));
-      ImpedanceLaw law(held.model, {false, false, false, false, true});
       NullSpace null_space(held.projector);
       null_space.compute(held.robot, held.impedance);
+      const JointVector p = 0.2 * random.vector(7);
+      if (null_space.unprojected()) {
+        held.wrenches.posture = null_space.wrench_of(held.impedance.null_stiffness.cwiseProduct(p));
+      }
+      // Beyond 2 rad a deflection counts as one of 2 rad.
+      if (const Vector6 e = held.hold(p); e.tail<3>().norm() > 2) continue;
+      ImpedanceLaw law(held.model, {false, false, false, false, true});
       const bool near_it = null_space.of_projector().nearly_singular();
       ++(near_it ? singular : regular);
       LawTorque asked;
@@ -208,7 +213,7 @@ TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
                  asked);
       const JointVector error = asked.posture_error;
       const NullSpaceChange change(held.kernel, held.q, held.robot, null_space, k % 2 == 1,
-                                   null_space.kinematic());
+                                   null_space.dynamic());
       const LoadedPosture posture{change, error};
       for (const Load load : {Load::kBaseWrench, Load::kToolWrench, Load::kJointTorques}) {
         const MatrixXd K = falling(

@@ -29,6 +29,7 @@ struct Loop {
   DynamicsResult robot;
   LoopSystem factored;
   bool nearly_singular = false;  // when last asked
+  NullProjector projector = NullProjector::kDynamic;
 
   Loop(const RobotModel& robot_model, Random& random)
       : model(robot_model), n(model.dof()), friction(random.vector(n).cwiseAbs()) {
@@ -40,7 +41,7 @@ struct Loop {
   }
   /// Expects the same M, C and K of both forms; returns the number of rows of the factor.
   Eigen::Index expect_agreement(const Impedance& impedance) {
-    NullSpace null_space;
+    NullSpace null_space(projector);
     null_space.compute(robot, impedance);
     nearly_singular = null_space.inertia().nearly_singular();
     analysis::System<kMaxJoints> plain, system;
@@ -126,6 +127,25 @@ TEST(LoopSystem, HasTheTipSpringsAndAsManyRowsAsTheyHold) {
     for (const int n : {6, 7, 9}) regular += expect_tip_springs(random, n);
   }
   EXPECT_GE(regular, 150);  // of 180
+}
+
+TEST(LoopSystem, HasARowForEachJointWithAnotherProjector) {
+  Random random(362);
+  for (const auto& [name, projector] : kNullProjectors) {
+    for (const int n : {6, 7, 9}) {
+      Loop loop(RobotModel::from_urdf_text(testing::RandomRobot(random.engine()()).chain(n, 0.2),
+                                           "link0", "tip", {}),
+                random);
+      loop.projector = projector;
+      for (int held = 1; held <= 6; ++held) {
+        const Setpoint setpoint = tip_setpoint(random, n, Frame::kTool, held);
+        const bool all = projector == NullProjector::kNone;
+        const bool any = all || n > held;
+        EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, n, projector)), any ? n : held)
+            << name << ", " << n << ", " << held;
+      }
+    }
+  }
 }
 
 TEST(LoopSystem, HasTheSpringsOfEitherModeAndOfTwoModesAndFramesAtOnce) {

@@ -11,6 +11,9 @@ export function nullDamping({null_damping: damping, null_stiffness: stiffness}) 
   return Array.isArray(damping) ? damping : stiffness.map((k) => (damping.factor || 0) * Math.sqrt(k));
 }
 
+/// The projector of the null space where it is not the controller's own.
+const projector = ({null_projector: name}) => (name === 'dynamic' ? undefined : name);
+
 /// The arm as keys of a configuration's `robot`: from the start of the program, with the changes of the page.
 function armKeys({setup, design}) {
   const arm = design.arm || {}, keys = {...setup.robot.keys};
@@ -40,8 +43,7 @@ export function configuration(of) {
   const unusual = (key, usual, name = key) =>
     (design[key] === usual && [undefined, usual].includes(loaded[key]) ? {} : {[name]: design[key]});
   const sampled = {...unusual('delay', 0), ...unusual('cutoff', 0), ...unusual('difference_velocity', false)};
-  const projected = [design, loaded].some((one) => one.null_projector === 'kinematic')
-    ? {null_projector: design.null_projector || 'dynamic'} : {};
+  const projected = [design, loaded].some(projector) ? {null_projector: design.null_projector || 'dynamic'} : {};
   const sections = {robot: {urdf, base, tip, ...armKeys(of)},
     control: {period: design.period, mode: design.mode, ...projected}, gains,
     limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
@@ -85,7 +87,7 @@ function gainOptions(design, stiffness, damping) {
     ...(prefix ? [] : [
       design.null_stiffness.some(Boolean) && `--null-stiffness ${design.null_stiffness.join(',')}`,
       null_damping.some(Boolean) && `--null-damping ${null_damping.join(',')}`,
-      design.null_projector === 'kinematic' && '--null-projector kinematic',
+      projector(design) && `--null-projector ${design.null_projector}`,
       design.rotation === 'half-quaternion' && '--rotation half-quaternion',
       design.frame === 'tool' && '--frame tool'])];
 }
@@ -139,7 +141,7 @@ export function python(of) {
     ...(joint ? [] : [`null_stiffness=${json(design.null_stiffness)}`,
       rest.ratio ? `null_damping_ratio=${rest.ratio}` : `null_damping=${json(nullDamping(design))}`,
       `frame="${design.frame || 'base'}"`,
-      ...(design.null_projector === 'kinematic' ? ['null_projector="kinematic"'] : [])])];
+      ...(projector(design) ? [`null_projector="${design.null_projector}"`] : [])])];
   return notes([
     answer.damping_level && answer.damping_level.share < 1 &&
       `The sampled loop leaves less of the ratio, which this call does not count: ${kDiffers}`,

@@ -62,7 +62,7 @@ function nullSpaceFields(form, design, n) {
       : form.slider({label: 'damping', key: 'null_damping', unit: 'N m s/rad', low: 0.01, high: 100, log: true,
         get: () => design().null_damping[0], set: all('null_damping')}),
     form.choice({label: 'its projector', key: 'null_projector',
-      options: [['dynamic', 'dynamically consistent'], ['kinematic', 'pseudo-inverse']],
+      options: [['dynamic', 'dynamically consistent'], ['kinematic', 'pseudo-inverse'], ['none', 'none: in all joints']],
       ...at(design, 'null_projector', 'dynamic')}),
     form.check({label: '× inertia of tip', key: 'inertia_blocks', ...at(design, 'inertia_blocks', false)})];
 }
