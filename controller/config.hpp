@@ -58,9 +58,9 @@ enum class GainPairs { kTogether, kEither };
 void read_gains(const text::YamlMapping& parent, const RobotModel& model, GainPairs pairs,
                 Gains& gains);
 
-/// Sets the projector that stands under `control`. Throws InputError.
+/// Sets the projector and its weights that stand under `control`. Throws InputError.
 void read_null_projector(const text::YamlMapping& root, const RobotModel& model,
-                         NullProjector& projector);
+                         NullProjector& projector, JointVector& weights);
 
 /// Returns the gains under the key `gains` of `parent`, one without the other. What is missing is
 /// zero. Throws InputError.

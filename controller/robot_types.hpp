@@ -82,12 +82,14 @@ enum class Mode : std::uint8_t {
 enum class NullProjector : std::uint8_t {
   kDynamic,    ///< X = M^-1 J' (J M^-1 J')^-1: nothing that acts there moves the tip
   kKinematic,  ///< X the pseudo-inverse J' (J J')^-1: a tip at rest under no load feels nothing
+  kWeighted,   ///< X = W^-1 J' (J W^-1 J')^-1 with a constant diagonal W; kKinematic has W = I
   kNone,       ///< X = 0: springs in all joints beside those of the tip, on arms of any joints
 };
 /// Their names, in the order of the enumerators.
-inline constexpr std::array<std::pair<std::string_view, NullProjector>, 3> kNullProjectors = {
+inline constexpr std::array<std::pair<std::string_view, NullProjector>, 4> kNullProjectors = {
     {{"dynamic", NullProjector::kDynamic},
      {"kinematic", NullProjector::kKinematic},
+     {"weighted", NullProjector::kWeighted},
      {"none", NullProjector::kNone}}};
 inline constexpr std::string_view name_of(NullProjector projector) noexcept {
   return kNullProjectors[static_cast<std::size_t>(projector)].first;

@@ -202,6 +202,7 @@ struct Settings {
   Energy energy;
   TaskTerms task_terms;
   NullProjector null_projector = NullProjector::kDynamic;
+  JointVector null_weights;  ///< W of NullProjector::kWeighted, n, positive
   Environment environment;
   /// Whether the joints' viscous friction in the model is subtracted from damping that is designed
   /// for a ratio. Only for friction that was measured, because modes have less than the ratio if

@@ -55,8 +55,8 @@ void take_preset(const std::string& name, int n, AuditOptions& audit,
   }
   const JointGains& joints = *preset.joints;
   if (n != static_cast<int>(joints.stiffness.size())) {
-    throw InputError("--preset", name + " has gains for seven joints, the arm has " +
-                                     std::to_string(n));
+    throw InputError("--preset",
+                     name + " has gains for seven joints, the arm has " + std::to_string(n));
   }
   const double t = joints.translation, r = joints.rotation;
   audit.gains.task_damping = controller::Vector6{t, t, t, r, r, r}.asDiagonal();
@@ -71,7 +71,7 @@ void read_gains_file(const std::string& path, const RobotModel& model, AuditOpti
   const text::YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("gains")) throw InputError("gains", "missing");
   audit.gains = controller::read_gains(root, model);
-  read_null_projector(root, model, audit.null_projector);
+  read_null_projector(root, model, audit.null_projector, audit.null_weights);
 } catch (const InputError& error) {
   throw error.in_file(path);
 }
@@ -133,9 +133,7 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
   read_options_gains(command, model, audit);
   if (command.mode == "joint") audit.mode = Mode::kJoint;
   if (!command.rotation.empty()) audit.half_quaternion = command.rotation == "half-quaternion";
-  if (!command.null_projector.empty()) {
-    audit.null_projector = controller::null_projector_of(command.null_projector);
-  }
+  command.arm.projector.take(model, audit.null_projector, audit.null_weights);
   if (command.frame == "tool") audit.gains.frame = controller::Frame::kTool;
   controller::Gains& gains = audit.gains;
   const double ratio =
@@ -290,9 +288,7 @@ CLI::Option* add_stated_options(CLI::App& command, AuditCommand& options) {
   add("--null-stiffness", options.null_stiffness, "Of the motions that the task leaves free",
       "a,b,...|x (0)");
   add("--null-damping", options.null_damping, "Of the same", "a,b,...|x (0)");
-  add("--null-projector", options.null_projector, "Through which they act",
-      "dynamic|kinematic|none (dynamic)")
-      ->check(CLI::IsMember({"dynamic", "kinematic", "none"}));
+  arm.projector.add(command);
   add_model_options(command, arm);
   add_loop_options(command, options.timing);
   for (CLI::Option* option : command.get_options([&](const CLI::Option* one) {

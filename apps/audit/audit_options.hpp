@@ -17,7 +17,6 @@ struct AuditCommand {
   std::string stiffness, damping;              ///< 6 each
   std::string joint_stiffness, joint_damping;  ///< n each, or one number
   std::string null_stiffness, null_damping;    ///< the same
-  std::string null_projector;
   std::optional<double> damping_factor;
   std::string rotation, frame;
   controller::LoopTiming timing;

@@ -163,6 +163,28 @@ SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
   return entry;
 }
 
+void ProjectorOption::add(CLI::App& command) {
+  std::vector<std::string> names;
+  for (const auto& [of, projector] : controller::kNullProjectors) names.emplace_back(of);
+  command.add_option("--null-projector", name, "Through which null-space gains act")
+      ->option_text("dynamic|kinematic|weighted|none (dynamic)")
+      ->check(CLI::IsMember(names));
+  command.add_option("--null-weights", weights, "Of the joints in the weighted projector")
+      ->option_text("a,b,...|x (1)");
+}
+
+void ProjectorOption::take(const RobotModel& model, controller::NullProjector& projector,
+                           controller::JointVector& W) const {
+  if (!name.empty()) projector = controller::null_projector_of(name);
+  if (weights.empty()) return;
+  if (projector != controller::NullProjector::kWeighted) {
+    throw InputError("--null-weights", "goes with --null-projector weighted");
+  }
+  const Units units(static_cast<std::size_t>(model.dof()), "");
+  W = quantities_per_joint("--null-weights", weights, units);
+  if (!(W.minCoeff() > 0)) throw InputError("--null-weights", "a weight is not positive");
+}
+
 void add_model_options(CLI::App& command, ArmOptions& arm) {
   const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
     command.add_option(name, text, help)->option_text(words);

@@ -10,6 +10,17 @@
 
 namespace dashpot::apps {
 
+/// The projector of the null space, as options give it.
+struct ProjectorOption {
+  std::string name;     ///< empty: another source says it
+  std::string weights;  ///< n positive numbers, or one for all joints
+
+  void add(CLI::App& command);
+  /// Sets what the options say.
+  void take(const controller::RobotModel& model, controller::NullProjector& projector,
+            controller::JointVector& W) const;
+};
+
 /// An arm at one configuration, as the options of `dashpot design --urdf` and `dashpot audit` give
 /// it; lists of quantities between commas.
 struct ArmOptions {
@@ -21,6 +32,7 @@ struct ArmOptions {
   // Further properties, none if empty; n numbers, or one for all joints
   std::string viscous_friction;   ///< N m s/rad, or "urdf" or "drives" for what these have
   std::string null_damping;       ///< of the motions that the task leaves free, N m s/rad
+  ProjectorOption projector;      ///< through which null-space gains act
   std::string reflected_inertia;  ///< kg m^2
   std::string drives;             ///< name of public figures
   GearOptions gears;

@@ -114,6 +114,7 @@ controller::Settings settings_of(const TunedArm& arm, const controller::AuditOpt
   settings.limits.gain_margin = stated.margin;
   settings.initial.mode = stated.mode;
   settings.null_projector = stated.null_projector;
+  settings.null_weights = stated.null_weights;
   controller::Gains gains = stated.gains;
   if (stated.half_quaternion) gains.task_stiffness.bottomRightCorner<3, 3>() *= 0.5;
   if (stated.mode == Mode::kCartesian) {  // the joint gains do not matter
@@ -200,7 +201,7 @@ bool TunedDesign::designed() const {
 }
 
 TunedDesign read_design(const TunedArm& arm, const Json& design) {
-  static constexpr std::array<std::string_view, 19> kKeys = {"mode",
+  static constexpr std::array<std::string_view, 20> kKeys = {"mode",
                                                              "frame",
                                                              "stiffness",
                                                              "damping",
@@ -209,6 +210,7 @@ TunedDesign read_design(const TunedArm& arm, const Json& design) {
                                                              "null_stiffness",
                                                              "null_damping",
                                                              "null_projector",
+                                                             "null_weights",
                                                              "rotation",
                                                              "inertia_blocks",
                                                              "period",
@@ -230,6 +232,10 @@ TunedDesign read_design(const TunedArm& arm, const Json& design) {
   read_choice(keys, "rotation", Choices<bool>{{{"vector", false}, {"half-quaternion", true}}},
               stated.half_quaternion);
   read_choice(keys, "null_projector", controller::kNullProjectors, stated.null_projector);
+  const int n = arm.model().dof();
+  stated.null_weights.setOnes(n);
+  read_numbers(keys, "null_weights", text::Units(static_cast<std::size_t>(n)), text::kPositive,
+               stated.null_weights);
   read_switch(keys, "inertia_blocks", stated.inertia_blocks);
   stated.period = arm.settings().period;
   read_number(keys, "period", "s", {0, true, 1}, stated.period);
@@ -271,6 +277,7 @@ Json design_json(const TunedArm& arm) {
           {"null_damping",
            damping_json(gains.null_damping_ratio, Eigen::MatrixXd(null_damping.asDiagonal()))},
           {"null_projector", name_of(settings.null_projector)},
+          {"null_weights", of_joints(settings.null_weights)},
           {"period", settings.period},
           {"delay", sampled.delay},
           {"cutoff", sampled.cutoff},

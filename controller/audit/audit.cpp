@@ -122,6 +122,10 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
   require(std::isfinite(options.integral_time) && options.integral_time >= 0,
           "integral_time: must be finite and not negative, s");
   require(std::isfinite(options.margin) && options.margin >= 1, "margin: must be at least 1");
+  require(options.null_weights.size() == 0 ||
+              (options.null_weights.size() == n && options.null_weights.allFinite() &&
+               options.null_weights.minCoeff() > 0),
+          "null_weights: need n positive entries");
   if (options.lower.size() == 0) options_.lower = model.joint_values(&Joint::lower);
   if (options.upper.size() == 0) options_.upper = model.joint_values(&Joint::upper);
   require(options_.lower.size() == n && options_.upper.size() == n &&
@@ -169,7 +173,7 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   }
   const DynamicsResult robot = evaluate(q);
   Impedance impedance = impedance_at(robot);
-  NullSpace null_space(options_.null_projector);
+  NullSpace null_space(options_.null_projector, options_.null_weights);
   if (impedance.null_space()) {
     null_space.compute(robot, impedance);
     if (!null_space.dynamic() && null_space.of_projector().nearly_singular()) {
@@ -241,11 +245,21 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
   result.damping = MatrixXd(arm_.friction().asDiagonal());
   if (!impedance.null_space() || n == 0) return result;
   const auto projected = [&](const JointVector& gains) -> analysis::NullSpaceDamping {
-    const MatrixXd D = gains.asDiagonal(), I = MatrixXd::Identity(n, n);
-    if (options_.null_projector == NullProjector::kNone) return {D, MatrixXd::Zero(n, n)};
-    return analysis::null_space_damping(
-        options_.null_projector == NullProjector::kDynamic ? result.mass : I, *result.jacobian,
-        *result.task_stiffness, D);
+    const MatrixXd D = gains.asDiagonal();
+    MatrixXd W = MatrixXd::Identity(n, n);
+    switch (options_.null_projector) {
+      case NullProjector::kNone:
+        return {D, MatrixXd::Zero(n, n)};
+      case NullProjector::kDynamic:
+        W = result.mass;
+        break;
+      case NullProjector::kWeighted:
+        if (options_.null_weights.size() > 0) W = options_.null_weights.asDiagonal();
+        break;
+      case NullProjector::kKinematic:
+        break;
+    }
+    return analysis::null_space_damping(W, *result.jacobian, *result.task_stiffness, D);
   };
   const analysis::NullSpaceDamping damping = projected(impedance.null_damping);
   *result.damping += damping.damping;

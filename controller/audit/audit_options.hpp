@@ -28,6 +28,7 @@ struct AuditOptions : LoopTiming {
   /// The projector of the null space's springs and dampers. Many controllers have the kinematic
   /// one.
   NullProjector null_projector = NullProjector::kDynamic;
+  JointVector null_weights;  ///< W of the weighted one, n, positive; without entries I
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
   /// Range of sampled postures, n, rad; without entries the position limits of the model.
   JointVector lower, upper;

@@ -116,6 +116,7 @@ std::optional<Settings> designing_settings(const RobotModel& model, const AuditO
   set_timing(options, settings);
   settings.limits.gain_margin = options.period > 0 ? options.margin : 1;
   settings.null_projector = options.null_projector;
+  settings.null_weights = options.null_weights;
   settings.initial.gains = gains;
   Gains& stated = settings.initial.gains;
   for (JointMatrix* matrix : {&stated.joint_stiffness, &stated.joint_damping}) {

@@ -98,10 +98,9 @@ Impedance blend(const Impedance& a, const Impedance& b, double s) noexcept {
       z.data()[i] = r * x.data()[i] + s * y.data()[i];
     }
   };
-  for (const auto number :
-       {&Impedance::joint_weight, &Impedance::task_weight, &Impedance::damping_ratio,
-        &Impedance::joint_damping_ratio, &Impedance::null_damping_ratio,
-        &Impedance::common_ratio}) {
+  for (const auto number : {&Impedance::joint_weight, &Impedance::task_weight,
+                            &Impedance::damping_ratio, &Impedance::joint_damping_ratio,
+                            &Impedance::null_damping_ratio, &Impedance::common_ratio}) {
     c.*number = r * a.*number + s * b.*number;
   }
   for (const auto tip : {&Impedance::base, &Impedance::tool}) {

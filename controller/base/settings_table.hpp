@@ -27,6 +27,7 @@ void for_each_setting(Struct& settings, Visitor&& visit) {
   visit(Setting{"control.mode"}, settings.initial.mode);
   visit(Setting{"control.load"}, settings.task_terms.load);
   visit(Setting{"control.null_projector"}, settings.null_projector);
+  visit(Setting{"control.null_weights", "", "", {1e-3, true, 1e3}}, settings.null_weights);
   visit(Setting{"control.energy"}, settings.energy.from);
   visit(Setting{"control.energy_store", "J", "", text::kPositive}, settings.energy.store);
   visit(Setting{"control.jacobian_rate"}, settings.task_terms.jacobian_rate);

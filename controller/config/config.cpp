@@ -254,14 +254,15 @@ Config read_config(const text::YamlNode& document, const std::filesystem::path& 
 }
 
 void read_null_projector(const text::YamlMapping& root, const RobotModel& model,
-                         NullProjector& projector) {
+                         NullProjector& projector, JointVector& weights) {
   Settings settings;
-  settings.null_projector = projector;
+  settings.null_weights.setOnes(model.dof());
   SettingsReader reader(root, model);
   for_each_setting(settings, [&](const Setting& setting, auto& value) {
     if (std::string_view(setting.key).starts_with("control.null_")) reader(setting, value);
   });
   projector = settings.null_projector;
+  weights = settings.null_weights;
 }
 
 Config load_config(const std::string& path) try {

@@ -25,11 +25,12 @@ void RatioDamper::update(const JointMatrix& M, const Jacobian* J) noexcept {
 }
 
 DesignedDamping::DesignedDamping(const JointVector& viscous_friction,
-                                 const analysis::BorneDamping& borne, NullProjector projector)
+                                 const analysis::BorneDamping& borne, NullProjector projector,
+                                 const JointVector& weights)
     : borne_(borne),
       joint_damper_(static_cast<int>(viscous_friction.size())),
       in_force_(static_cast<int>(viscous_friction.size())),
-      null_space_(projector) {
+      null_space_(projector, weights) {
   if ((viscous_friction.array() > 0).any()) friction_ = viscous_friction;
 }
 

@@ -21,9 +21,13 @@ void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
     A.noalias() += y * y.transpose();
   }
   inertia_.compute(A, impedance.base, impedance.tool, robot.R_BT);
-  if (!dynamic()) J_ = robot.J;
-  if (projector_ == NullProjector::kKinematic) {
-    unit_inertia_.compute(J_ * J_.transpose(), impedance.base, impedance.tool, robot.R_BT);
+  if (!dynamic()) {
+    J_ = robot.J;
+    if (per_weight_.size() != n) per_weight_.setOnes(n);
+  }
+  if (!dynamic() && !unprojected()) {
+    const Jacobian weighted = J_ * per_weight_.asDiagonal();
+    of_weights_.compute(weighted * J_.transpose(), impedance.base, impedance.tool, robot.R_BT);
   }
   level_ = {};
   ratio_damping_.resize(0, 0);
@@ -35,10 +39,7 @@ void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
 JointVector NullSpace::spring(const JointVector& k, const JointVector& dq) const noexcept {
   JointVector y(dq.size());
   for (Eigen::Index i = 0; i < dq.size(); ++i) y[i] = k[i] * dq[i];
-  if (!dynamic()) {
-    project_joints(y);
-    return y;
-  }
+  if (!dynamic()) return y - held(per_weight_.cwiseProduct(y));
   mass_.solve_L(y.data());
   project(y);
   mass_.multiply_L(y.data());
@@ -47,10 +48,7 @@ JointVector NullSpace::spring(const JointVector& k, const JointVector& dq) const
 
 JointVector NullSpace::projected_velocity(const JointVector& dq) const noexcept {
   JointVector y = dq;
-  if (!dynamic()) {
-    project_joints(y);
-    return y;
-  }
+  if (!dynamic()) return y - per_weight_.cwiseProduct(held(y));
   mass_.multiply_LT(y.data());
   project(y);
   mass_.solve_LT(y.data());
@@ -142,8 +140,8 @@ JointVector NullSpace::ratio_damper(const JointVector& dqd) const noexcept {
 JointVector NullSpace::explained(const Vector6& e) const noexcept {
   if (dynamic()) return joint_velocity(e);
   JointVector dq = JointVector::Zero(J_.cols());
-  add_torque(J_, unit_inertia_.wrench(e), dq);
-  return dq;
+  add_torque(J_, of_weights_.wrench(e), dq);
+  return per_weight_.cwiseProduct(dq);
 }
 
 JointVector NullSpace::joint_velocity(const Vector6& twist) const noexcept {

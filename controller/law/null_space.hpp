@@ -20,19 +20,23 @@ namespace dashpot::controller {
 /// within [0, 1], and for any stiffness k and deflection dq the torque N' k N dq is at most
 ///     cond(M) max(k) |dq|.
 ///
-/// NullProjector::kKinematic gives springs and dampers the same with I for M: N = I - J' H G^-1 H J
-/// with G of A = J J', symmetric, and a torque of at most max(k) |dq|. Where the tip stands still,
-/// N leaves the same motions free; but a torque N t accelerates the tip, because N is orthogonal in
-/// joint coordinates and not in energy. All else is as above: the damping for a ratio, the joint
-/// velocity of a twist, the inertia.
+/// NullProjector::kWeighted gives springs and dampers the same with a constant diagonal W for M:
+/// N = I - W^-1 J' H G^-1 H J with G of A = J W^-1 J', and a torque of at most cond(W) max(k) |dq|.
+/// NullProjector::kKinematic has W = I. Where the tip stands still, N leaves the same motions free;
+/// but a torque N' t accelerates the tip, because N is orthogonal in W and not in energy. All else
+/// is as above: the damping for a ratio, the joint velocity of a twist, the inertia.
 ///
 /// NullProjector::kNone has N = I: its springs and dampers are those of joints, which act on the
-/// tip as well. The damping for a ratio has P = I, and, with Impedance::common_ratio, K_0 + J' K_C J
-/// for K_0.
+/// tip as well. The damping for a ratio has P = I, and, with Impedance::common_ratio, K_0 + J' K_C
+/// J for K_0.
 class NullSpace {
  public:
-  explicit NullSpace(NullProjector projector = NullProjector::kDynamic) noexcept
-      : projector_(projector) {}
+  /// `weights` is W (n); without entries it is I.
+  explicit NullSpace(NullProjector projector = NullProjector::kDynamic,
+                     const JointVector& weights = {}) noexcept
+      : projector_(projector) {
+    if (projector == NullProjector::kWeighted) per_weight_ = weights.cwiseInverse();
+  }
 
   /// Computes the null space of the directions that an impedance selects, and, if it has null-space
   /// springs and a ratio for them, the damping D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, in
@@ -73,8 +77,10 @@ class NullSpace {
   const TaskInertia& inertia() const noexcept { return inertia_; }
   bool dynamic() const noexcept { return projector_ == NullProjector::kDynamic; }
   bool unprojected() const noexcept { return projector_ == NullProjector::kNone; }
-  /// Returns the inertia, or, of another projector, what is in its place, with I for M.
-  const TaskInertia& of_projector() const noexcept { return dynamic() ? inertia_ : unit_inertia_; }
+  /// Returns the inertia, or, of another projector, what is in its place, with W for M.
+  const TaskInertia& of_projector() const noexcept { return dynamic() ? inertia_ : of_weights_; }
+  /// Returns W^-1 of a projector that is not dynamic, n.
+  const JointVector& per_weight() const noexcept { return per_weight_; }
   /// Returns L.
   const SmallCholesky& mass() const noexcept { return mass_; }
   /// Replaces y by P y.
@@ -83,9 +89,11 @@ class NullSpace {
   }
 
  private:
-  /// Replaces dq by N dq of a projector that is not dynamic.
-  void project_joints(JointVector& dq) const noexcept {
-    add_torque(J_, -unit_inertia_.wrench(twist(J_, dq)), dq);
+  /// Returns J' H G^-1 H J dq with the G of W.
+  JointVector held(const JointVector& dq) const noexcept {
+    JointVector torque = JointVector::Zero(dq.size());
+    add_torque(J_, of_weights_.wrench(twist(J_, dq)), torque);
+    return torque;
   }
   /// Returns the damping of a free motion of a frequency, 1/s, and lowers `level` to its share of
   /// the ratio.
@@ -104,8 +112,9 @@ class NullSpace {
 
   NullProjector projector_;
   TaskInertia inertia_;
-  TaskInertia unit_inertia_;  ///< of a kinematic projector, as is J_; zero without one
+  TaskInertia of_weights_;  ///< with W for M, as are the next two; zero without a projector
   Jacobian J_;
+  JointVector per_weight_;  ///< W^-1
   SmallCholesky mass_;
   Jacobian Jh_;
   JointMatrix ratio_damping_;

@@ -81,6 +81,7 @@ Settings default_settings(const RobotModel& model) {
   const double linear = std::min(400.0, 0.5 * kFastest * kFastest * least.linear);
   const double angular = std::min(20.0, 0.5 * kFastest * kFastest * least.angular);
   gains.task_stiffness.diagonal() << linear, linear, linear, angular, angular, angular;
+  settings.null_weights = JointVector::Ones(n);
   gains.null_stiffness = 0.25 * gains.joint_stiffness.diagonal();
   // For directions without springs, in which a ratio gives no damping.
   const double slide = std::min(40.0, kFastestDecay * least.linear);

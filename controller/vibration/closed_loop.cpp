@@ -206,8 +206,8 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Actin
   TipWrenches wrenches = acting.wrenches;
   if (acting.posture && impedance.null_space() && (loaded || terms.jacobian_rate)) {
     if (null_space.unprojected()) {
-      wrenches.posture = null_space.wrench_of(
-          impedance.null_stiffness.cwiseProduct(acting.posture->error));
+      wrenches.posture =
+          null_space.wrench_of(impedance.null_stiffness.cwiseProduct(acting.posture->error));
     } else {
       change.emplace(*acting.posture->kernel, *acting.posture->q, robot, null_space,
                      !impedance.tool.none(), null_space.dynamic());

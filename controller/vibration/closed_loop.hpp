@@ -31,8 +31,8 @@ struct LoadedPosture {
 };
 
 /// Returns what a load adds to the stiffness J' K_C J of springs at rest, n x n, where the springs
-/// of `impedance` hold it: they carry F = -w_C (f + f_c) - f_p, without the directions in which there
-/// is no spring, at the error e with K_C e = F, and
+/// of `impedance` hold it: they carry F = -w_C (f + f_c) - f_p, without the directions in which
+/// there is no spring, at the error e with K_C e = F, and
 ///     -d(J' (F + f_c) + load)/dq - J' K_C J = J' (S - K_C J) - K_G(F + f_c) + stiffness_of_load,
 ///     S = K_B (J_v; A J_w) + K_T (J_v; A J_w) + (([F_l x]; [F_m x]) - K_T ([e_l x]; [e_m x])) J_w.
 /// K_B is given in B's axes, K_T in the tool's and turned into B's; F in the second line is the
@@ -41,8 +41,8 @@ struct LoadedPosture {
 /// hold it cancel up to e, whereas constant joint torques leave +K_G(f), the term of the paper.
 ///
 /// Springs of joints carry none of F, and K_C has to hold all of it, but posture springs without a
-/// projector carry f_p = Lambda J M^-1 K_0 p of it as they pull just now. A deflection of more than 2
-/// rad counts as one of 2 rad.
+/// projector carry f_p = Lambda J M^-1 K_0 p of it as they pull just now. A deflection of more than
+/// 2 rad counts as one of 2 rad.
 ///
 /// The load also adds to the stiffness N' K_0 N of posture springs, as N' and J# e change with q,
 ///     -d(N' t)/dq + N' K_0 (1 + d(s J# e)/dq - N),     t = K_0 p constant in the first term.

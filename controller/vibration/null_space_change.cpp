@@ -24,8 +24,8 @@ NullSpaceChange::NullSpaceChange(const DynamicsKernel& kernel, const JointVector
   mobility_.resize(n, n);
   for (Index i = 0; i < n; ++i) {
     const JointVector unit = JointVector::Unit(n, i);
-    mobility_.col(i) =
-        dynamic_ ? null_space.projected_acceleration(unit) : null_space.projected_velocity(unit);
+    mobility_.col(i) = dynamic_ ? null_space.projected_acceleration(unit)
+                                : null_space.projected_velocity(null_space.per_weight()[i] * unit);
   }
   torque_projector_ = JointMatrix::Identity(n, n);
   torque_projector_ -= J_.transpose().lazyProduct(share_.transpose());
@@ -37,6 +37,7 @@ void NullSpaceChange::set_spread(const NullSpace& null_space) noexcept {
   const Index n = J_.cols();
   const TaskInertia& inertia = dynamic_ ? null_space.inertia() : null_space.of_projector();
   moved_ = J_.transpose();
+  if (!dynamic_) moved_ = null_space.per_weight().asDiagonal() * moved_;
   for (Index i = 0; i < 6 && dynamic_; ++i) {
     null_space.mass().solve_L(&moved_(0, i));
     null_space.mass().solve_LT(&moved_(0, i));

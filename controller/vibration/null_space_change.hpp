@@ -13,8 +13,8 @@ namespace dashpot::controller {
 ///     d(N' t)/dq_k = -N' dJ_k' h - J' G dJ_k z + (1 - N') dM_k z,    h = J#' t, z = M^-1 N' t.
 /// If the arm is nearly singular, G changes by -S_k = -TaskInertia::spread as well, which adds
 ///     -M^-1 J' S_k V    and    J' S_k J M^-1 t.
-/// For the kinematic projector M is I, and dM_k is zero. If the selected directions turn with the
-/// tool, the turning of J's rows is subtracted from dJ_k.
+/// For a projector with constant weights W, M is W, and dM_k is zero. If the selected directions
+/// turn with the tool, the turning of J's rows is subtracted from dJ_k.
 class NullSpaceChange {
  public:
   using TipMatrix = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, kMaxJoints, 6>;

@@ -153,11 +153,12 @@ DesignedDamping designed_damping(const RobotModel& model, const Settings& settin
   JointVector subtracted = JointVector::Zero(model.dof());
   if (settings.subtract_friction) subtracted = friction_left(model, settings).cwiseMax(0);
   const double margin = settings.limits.gain_margin;
-  if (margin == 1) return DesignedDamping(subtracted, {}, settings.null_projector);
   analysis::SampledLoop loop;
   loop.friction = Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).asDiagonal();
-  return DesignedDamping(subtracted, {timed(timing_of(settings), loop), kReserve * margin},
-                         settings.null_projector);
+  const analysis::BorneDamping borne =
+      margin == 1 ? analysis::BorneDamping()
+                  : analysis::BorneDamping(timed(timing_of(settings), loop), kReserve * margin);
+  return DesignedDamping(subtracted, borne, settings.null_projector, settings.null_weights);
 }
 
 analysis::System<> unbounded(const analysis::System<kMaxJoints>& system) {

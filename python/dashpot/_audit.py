@@ -181,7 +181,8 @@ def _measured(robot: Robot, joints: Mapping[str, Any]) -> Array:
 def _task(robot: Robot, *, task_stiffness: npt.ArrayLike | None = None,
           task_damping: npt.ArrayLike | None = None, damping_factor: float | None = None,
           null_stiffness: npt.ArrayLike | None = None, null_damping: npt.ArrayLike | None = None,
-          null_projector: str = "dynamic", joint_stiffness: npt.ArrayLike | None = None,
+          null_projector: str = "dynamic", null_weights: npt.ArrayLike | None = None,
+          joint_stiffness: npt.ArrayLike | None = None,
           joint_damping: npt.ArrayLike | None = None, frame: str = "base",
           directions: Sequence[str] = DIRECTIONS, half_quaternion: bool = False,
           inertia_blocks: bool = False, period: float = 0, delay: int = 0, cutoff: float = 0,
@@ -208,7 +209,7 @@ def _task(robot: Robot, *, task_stiffness: npt.ArrayLike | None = None,
         joint_damping=_damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"),
         null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
-                               "null_projector": known_projector(null_projector),
+                               **known_projector(null_projector, null_weights),
                                "period": float(period), "delay": delay, "cutoff": float(cutoff),
                                "difference_velocity": difference_velocity,
                                "integral_time": float(integral_time),
@@ -229,6 +230,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           task_stiffness: npt.ArrayLike | None = None, task_damping: npt.ArrayLike | None = None,
           damping_factor: float | None = None, null_stiffness: npt.ArrayLike | None = None,
           null_damping: npt.ArrayLike | None = None, null_projector: str = "dynamic",
+          null_weights: npt.ArrayLike | None = None,
           joint_stiffness: npt.ArrayLike | None = None,
           joint_damping: npt.ArrayLike | None = None, frame: str = "base",
           directions: Sequence[str] = DIRECTIONS, half_quaternion: bool = False,
@@ -256,12 +258,13 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     entry. With `half_quaternion` the controller's error is half of the rotation vector; with
     `inertia_blocks` it multiplies gains by the tip's inertia, separately for translation and
     rotation; with a `null_projector` of "kinematic" instead of "dynamic" null-space gains act through
-    I - J^+ J, with "none" in all joints. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
-    (Hz; 0: none), `difference_velocity`, and an integral of the springs with `integral_time` (s; 0:
-    none), which affects only the gain margin. The torque against gravity is as late as the rest,
-    unless it is `ideal_gravity`, as of a robot that holds itself. If the robot lacks reflected
-    inertia, the posture has the inertia that would suffice for a gain margin of `margin`. Modes
-    below `soft_frequency` (rad/s) are soft.
+    I - J^+ J, with "weighted" through I - J^+ J with `null_weights` in J^+, with "none" in all joints.
+    The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff` (Hz; 0:
+    none), `difference_velocity`, and an integral of the springs with `integral_time` (s; 0: none),
+    which affects only the gain margin. The torque against gravity is as late as the rest, unless it
+    is `ideal_gravity`, as of a robot that holds itself. If the robot lacks reflected inertia, the
+    posture has the inertia that would suffice for a gain margin of `margin`. Modes below
+    `soft_frequency` (rad/s) are soft.
 
     An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
     results are the same to the last bit for any executor and number of workers.
@@ -273,8 +276,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     task = _task(
         robot, task_stiffness=task_stiffness, task_damping=task_damping,
         damping_factor=damping_factor, null_stiffness=null_stiffness, null_damping=null_damping,
-        null_projector=null_projector, joint_stiffness=joint_stiffness, joint_damping=joint_damping,
-        frame=frame, directions=directions, half_quaternion=half_quaternion,
+        null_projector=null_projector, null_weights=null_weights, joint_stiffness=joint_stiffness,
+        joint_damping=joint_damping, frame=frame, directions=directions, half_quaternion=half_quaternion,
         inertia_blocks=inertia_blocks, period=period, delay=delay, cutoff=cutoff,
         difference_velocity=difference_velocity, integral_time=integral_time,
         ideal_gravity=ideal_gravity, margin=margin, soft_frequency=soft_frequency, lower=lower,

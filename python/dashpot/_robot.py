@@ -18,7 +18,7 @@ from ._core import Error
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
-PROJECTORS = ("dynamic", "kinematic", "none")
+PROJECTORS = ("dynamic", "kinematic", "weighted", "none")
 LOADS = ("base_wrench", "tool_wrench", "joint_torques")
 
 
@@ -330,11 +330,16 @@ def one_damping(part: str, stiffness: npt.ArrayLike | None, damping: npt.ArrayLi
                     f"{part}_stiffness; {part}_damping = zeros is a loop without damping")
 
 
-def known_projector(null_projector: str) -> str:
-    """Returns the name of a projector of the null space."""
+def known_projector(null_projector: str, null_weights: npt.ArrayLike | None) -> dict[str, Any]:
+    """Returns a projector of the null space, and its weights if it has some."""
     if null_projector not in PROJECTORS:
         raise Error(f"null_projector: {null_projector!r} is not one of {', '.join(PROJECTORS)}")
-    return null_projector
+    if null_weights is None:
+        return {"null_projector": null_projector}
+    weights = to_numbers("null_weights", null_weights, 1)
+    if null_projector != "weighted" or not (weights > 0).all():
+        raise Error("null_weights: they are positive, and go with null_projector='weighted'")
+    return {"null_projector": null_projector, "null_weights": weights}
 
 
 def selected(directions: Sequence[str]) -> list[bool]:
@@ -396,7 +401,8 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
                 joint_damping: npt.ArrayLike | None = None, joint_damping_ratio: float = 0,
                 frame: str = "base", directions: Sequence[str] = DIRECTIONS,
                 external_wrench: npt.ArrayLike | None = None, load: str = "base_wrench",
-                soft_frequency: float = 0.1, null_projector: str = "dynamic") -> ClosedLoop:
+                soft_frequency: float = 0.1, null_projector: str = "dynamic",
+                null_weights: npt.ArrayLike | None = None) -> ClosedLoop:
     """Returns the loop that Dashpot's controller closes around the robot at rest at q (n, rad).
 
     Matrices are symmetric positive semidefinite, and may be given as their diagonals. With
@@ -404,19 +410,20 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     a pose of the tip, with `task_stiffness` K_C and `task_damping` C_C (6 x 6, in the axes of
     `frame`, base or tool). In the motions that the selected `directions` leave free act
     `null_stiffness` and `null_damping` (n each), through the dynamically consistent projector or,
-    with a `null_projector` of "kinematic", the projector of the pseudo-inverse; with "none" they act
-    in all joints, and one ratio of tip and null space is the tip's, of all springs. A damping ratio
-    above 0 has the damping designed for it; the robot's viscous friction comes on top, and moves
-    the ratios. The springs hold an `external_wrench` (6, of the world on the tip, in the base's
-    axes) at q; `load` says how it moves with the arm, which adds stiffness: base_wrench,
-    tool_wrench (it turns with the tip), joint_torques (its joint torques are constant).
+    with a `null_projector` of "kinematic", the projector of the pseudo-inverse, or with "weighted"
+    and `null_weights` W (n, positive) I - W^-1 J' (J W^-1 J')^-1 J; with "none" they act in all
+    joints, and if tip and null space have a ratio, all springs have the tip's. A damping ratio above
+    0 has the damping designed for it; the robot's viscous friction comes on top, and moves the
+    ratios. The springs hold an `external_wrench` (6, of the world on the tip, in the base's axes) at
+    q; `load` says how it moves with the arm, which adds stiffness: base_wrench, tool_wrench (it turns
+    with the tip), joint_torques (its joint torques are constant).
 
     Raises Error for a posture outside the position limits, gains that the controller would refuse,
     and springs without damping, or with both a matrix and a ratio.
     """
     if load not in LOADS:
         raise Error(f"load: {load!r} is not one of {', '.join(LOADS)}")
-    projector = known_projector(null_projector)
+    projector = known_projector(null_projector, null_weights)
     kind = 0 if external_wrench is None else 1 + LOADS.index(load)
     at_tip = joint_stiffness is None and joint_damping is None and joint_damping_ratio == 0
     if not at_tip and not (task_stiffness is None and task_damping is None):
@@ -438,6 +445,6 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
         warnings.warn(doubt, stacklevel=2)
     found = _core.closed_loop(robot._core, posture, gains, at_tip,
                               to_vector("external_wrench", external_wrench), kind, soft_frequency,
-                              projector)
+                              null_projector, projector.get("null_weights"))
     return ClosedLoop(found["mass"], found["damping"], found["stiffness"],
                       make_modes(found["modes"]))

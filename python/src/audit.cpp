@@ -53,11 +53,11 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   take("integral_time", options.integral_time);
   take("ideal_gravity", options.ideal_gravity);
   take("margin", options.margin);
-  if (given.contains("lower")) {
-    options.lower = robot.joint_vector("lower", nb::cast<Eigen::VectorXd>(given["lower"]));
-  }
-  if (given.contains("upper")) {
-    options.upper = robot.joint_vector("upper", nb::cast<Eigen::VectorXd>(given["upper"]));
+  for (const auto& [key, values] : {std::pair("lower", &options.lower),
+                                    {"upper", &options.upper},
+                                    {"null_weights", &options.null_weights}}) {
+    if (!given.contains(key)) continue;
+    *values = robot.joint_vector(key, nb::cast<Eigen::VectorXd>(given[key]));
   }
   return {robot, Audit(robot.model, options)};
 }

@@ -58,12 +58,14 @@ Eigen::MatrixXd tip_pose(const Robot& robot, const Eigen::VectorXd& q) {
 
 analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, const Gains& gains,
                                   controller::Mode mode, const OptionalVector& wrench,
-                                  controller::Load load, const std::string& projector) {
+                                  controller::Load load, const std::string& projector,
+                                  const OptionalVector& weights) {
   const controller::SetpointFault fault = check_gains(gains, mode, robot.model.dof());
   if (fault) throw std::invalid_argument(std::string(fault.key) + " " + fault.reason);
   Settings settings = controller::default_settings(robot.model);
   settings.task_terms.load = load;
   settings.null_projector = controller::null_projector_of(projector);
+  if (weights) settings.null_weights = robot.joint_vector("null_weights", *weights);
   settings.limits.gain_margin = 1;  // no loop is given for which a ratio could be lowered
   return controller::PostureLoop(robot.model, settings)
       .at(q, gains, mode, wrench.value_or(Eigen::VectorXd(Eigen::VectorXd::Zero(6))))
@@ -72,7 +74,7 @@ analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, cons
 
 nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& gains,
                      bool cartesian, const OptionalVector& wrench, int load, double soft_frequency,
-                     const std::string& projector) {
+                     const std::string& projector, const OptionalVector& weights) {
   analysis::System<> system;
   analysis::Spectrum<> spectrum;
   {
@@ -82,7 +84,7 @@ nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& 
     }
     const auto mode = cartesian ? controller::Mode::kCartesian : controller::Mode::kJoint;
     system = closed_loop_at(robot, robot.joint_vector("q", q), gains, mode, wrench,
-                            static_cast<controller::Load>(load), projector);
+                            static_cast<controller::Load>(load), projector, weights);
     analysis::SpectrumOptions options;
     options.soft_frequency = soft_frequency;
     spectrum = analysis::analyze(system, options);
@@ -188,7 +190,7 @@ void add_robot(nb::module_& m) {
       });
   m.def("closed_loop", &closed_loop, nb::arg("robot"), nb::arg("q"), nb::arg("gains"),
         nb::arg("cartesian"), nb::arg("external_wrench").none(), nb::arg("load"),
-        nb::arg("soft_frequency"), nb::arg("projector"));
+        nb::arg("soft_frequency"), nb::arg("projector"), nb::arg("weights").none());
 }
 
 }  // namespace dashpot::python

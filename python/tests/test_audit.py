@@ -101,6 +101,17 @@ def test_a_kinematic_null_space_acts_through_the_pseudo_inverse(panda):
             dashpot.closed_loop(panda, q, **damped, null_projector="both")
         other = dashpot.audit(panda, q, **GAINS, **null_space).posture
         assert abs(other.fastest_pole / values.real.min() - 1) > 1e-3
+        W = np.diag(np.linspace(0.3, 3, 7))
+        V = np.linalg.inv(W)
+        N = np.eye(7) - V @ J.T @ np.linalg.solve(J @ V @ J.T, J)
+        weighted = dict(null_projector="weighted", null_weights=np.diag(W))
+        loop = dashpot.closed_loop(panda, q, **damped, **null_space, **weighted)
+        np.testing.assert_allclose(loop.stiffness, J.T @ K_C @ J + 10 * N.T @ N, atol=1e-9 * abs(K).max())
+        stated = dashpot.audit(panda, q, **GAINS, **null_space, **weighted).posture.modes
+        np.testing.assert_allclose(stated.natural_frequency, loop.modes.natural_frequency, rtol=1e-4)
+        for wrong in (dict(weighted, null_weights=[0.0] * 7), dict(null_weights=[1.0] * 7)):
+            with pytest.raises(dashpot.Error, match="null_weights"):
+                dashpot.closed_loop(panda, q, **damped, **wrong)
         both = dashpot.closed_loop(panda, q, **damped, **null_space, null_projector="none")
         np.testing.assert_allclose(both.stiffness, J.T @ K_C @ J + 10 * np.eye(7), atol=1e-9 * abs(K).max())
         both = dashpot.closed_loop(panda, q, task_stiffness=GAINS["task_stiffness"], task_damping_ratio=0.6,

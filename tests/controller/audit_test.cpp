@@ -168,22 +168,30 @@ TEST_F(AuditOfPanda, CountsSpringsInTheNullSpace) {
   EXPECT_EQ(numbers().zero_modes, 1);
 }
 
-TEST_F(AuditOfPanda, TakesTheProjectorOfThePseudoInverse) {
+TEST_F(AuditOfPanda, TakesProjectorsOfPseudoInverses) {
   options.gains.null_stiffness = JointVector::Constant(7, 10);
   options.gains.null_damping = JointVector::Constant(7, 6);
-  options.null_projector = NullProjector::kKinematic;
-  const Audit audit(model, options);
-  for (int k = 0; k < 50; ++k) {
-    const JointVector q = audit.posture(1, k);
-    TaskLoop loop = loop_at(model, q, options);
-    const MatrixXd z =
-        Eigen::FullPivLU<MatrixXd>(evaluate(model, q, JointVector::Zero(7)).J).kernel();
-    const MatrixXd N = z * z.transpose() / z.squaredNorm();
-    loop.stiffness += 10 * N;
-    loop.damping += 6 * N;
-    expect_numbers(audit.numbers(q), loop, 1e-8);
-    expect_numbers(audit.audit(q).numbers, loop, 1e-8);
+  for (const NullProjector projector : {NullProjector::kKinematic, NullProjector::kWeighted}) {
+    options.null_projector = projector;
+    const bool weighted = projector == NullProjector::kWeighted;
+    if (weighted) options.null_weights = JointVector::LinSpaced(7, 0.3, 3);
+    const MatrixXd W =
+        weighted ? MatrixXd(options.null_weights.asDiagonal()) : MatrixXd::Identity(7, 7);
+    const Audit audit(model, options);
+    for (int k = 0; k < 50; ++k) {
+      const JointVector q = audit.posture(1, k);
+      TaskLoop loop = loop_at(model, q, options);
+      const MatrixXd z =
+          Eigen::FullPivLU<MatrixXd>(evaluate(model, q, JointVector::Zero(7)).J).kernel();
+      const MatrixXd N = z * (z.transpose() * W * z).inverse() * z.transpose() * W;
+      loop.stiffness += 10 * N.transpose() * N;
+      loop.damping += 6 * N.transpose() * N;
+      expect_numbers(audit.numbers(q), loop, 1e-8);
+      expect_numbers(audit.audit(q).numbers, loop, 1e-8);
+    }
   }
+  options.null_weights = JointVector::Zero(7);
+  EXPECT_THROW(Audit(model, options), std::invalid_argument);
 }
 
 TEST_F(AuditOfPanda, TakesSpringsOfTipAndJointsAtOnce) {

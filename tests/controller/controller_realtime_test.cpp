@@ -56,7 +56,7 @@ TEST(Realtime, UpdateNeverAllocates) {
   EXPECT_GE(allocations_of([] { ::operator delete(::operator new(100)); }), 1);
   DrivenPanda arm(Analysis::Where::kInline, 100, 0.02);
   EXPECT_EQ(allocations_of([&] { arm.run(150'000), arm.controller->reset(); }), 0);
-  for (const NullProjector projector : {NullProjector::kKinematic, NullProjector::kNone}) {
+  for (const NullProjector projector : {NullProjector::kWeighted, NullProjector::kNone}) {
     DrivenPanda other(Analysis::Where::kInline, 10, 0.02, projector);
     EXPECT_EQ(allocations_of([&] { other.run(20'000); }), 0);
   }

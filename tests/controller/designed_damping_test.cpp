@@ -156,7 +156,8 @@ TEST(DesignedDamping, HoldsOneRatioOfSpringsAtTheTipAndInTheJoints) {
     const MatrixXd inverse = MatrixXd(L.matrixL()).inverse();
     const MatrixXd K = 30 * inverse * inverse.transpose();
     const MatrixXd root = Eigen::SelfAdjointEigenSolver<MatrixXd>(K).operatorSqrt();
-    EXPECT_TRUE(near(inverse * led.damping() * inverse.transpose(), 1.4 * root, 1e-9 * root.norm()));
+    EXPECT_TRUE(
+        near(inverse * led.damping() * inverse.transpose(), 1.4 * root, 1e-9 * root.norm()));
   }
 }
 

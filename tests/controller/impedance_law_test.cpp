@@ -51,6 +51,7 @@ struct Case {
   Vector3d p_d;
   Quaterniond R_d;
   NullProjector projector = NullProjector::kDynamic;
+  JointVector weights = JointVector::LinSpaced(n, 0.3, 3);
 
   Case(const RobotModel& robot_model, Random& random)
       : model(robot_model),
@@ -73,7 +74,7 @@ struct Case {
   }
   JointVector torque(const Impedance& impedance, const FeedForward& parts, const Vector6& wrench) {
     ImpedanceLaw law(model, parts);
-    NullSpace null_space(projector);
+    NullSpace null_space(projector, weights);
     null_space.compute(robot, impedance);
     LawTorque result;
     law.torque({robot, q, qd, impedance, null_space, references, kEndless, wrench}, result);
@@ -185,8 +186,10 @@ void expect_task_law(const RobotModel& model, Random& random,
   if (n > held || kind == NullProjector::kNone) {
     MatrixXd inverse = MatrixXd::Zero(n, held);
     if (kind == NullProjector::kDynamic) inverse = pseudo;
-    if (kind == NullProjector::kKinematic) {
-      inverse = JS.transpose() * MatrixXd(JS * JS.transpose()).inverse();
+    if (kind == NullProjector::kKinematic || kind == NullProjector::kWeighted) {
+      MatrixXd V = MatrixXd::Identity(n, n);
+      if (kind == NullProjector::kWeighted) V = one.weights.cwiseInverse().asDiagonal();
+      inverse = V * JS.transpose() * MatrixXd(JS * V * JS.transpose()).inverse();
     }
     const MatrixXd projector = MatrixXd::Identity(n, n) - inverse * JS;
     const JointReference& rest = one.references.posture;
@@ -214,6 +217,8 @@ TEST(CartesianImpedance, IsItsEquation) {
     expect_task_law(rough_chain(random, 14), random);
     expect_task_law(testing::arm_model(testing::arms()[0]), random, NullProjector::kKinematic);
     expect_task_law(rough_chain(random, 9), random, NullProjector::kKinematic);
+    expect_task_law(testing::arm_model(testing::arms()[0]), random, NullProjector::kWeighted);
+    expect_task_law(rough_chain(random, 9), random, NullProjector::kWeighted);
     expect_task_law(testing::arm_model(testing::arms()[2]), random, NullProjector::kNone);
     expect_task_law(rough_chain(random, 9), random, NullProjector::kNone);
   }

@@ -34,6 +34,7 @@ struct HeldLoad {
   Impedance impedance{7};
   TipWrenches wrenches;
   NullProjector projector = NullProjector::kDynamic;
+  JointVector weights = JointVector::LinSpaced(7, 0.3, 3);
   SpringReferences references{{JointVector::Ones(7), JointVector::Ones(7), 1, 1, 1, 1, 0.01, 0},
                               1e-3};
 
@@ -86,7 +87,7 @@ struct HeldLoad {
   JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there,
                      const JointVector& qd) const {
     const DynamicsResult now = at(there);
-    NullSpace null_space(projector);
+    NullSpace null_space(projector, weights);
     null_space.compute(now, impedance);
     LawTorque result;
     law.torque({now, there, qd, impedance, null_space, references, kUnclamped, wrenches.commanded},
@@ -129,7 +130,7 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
   for (int k = 0; k < 60; ++k) {
     HeldLoad held(random);
     const bool loaded = k % 5 > 0;
-    held.projector = kNullProjectors[k % kNullProjectors.size()].second;
+    held.projector = kNullProjectors[static_cast<std::size_t>(k) % kNullProjectors.size()].second;
     Setpoint setpoint;
     setpoint.gains = springs(random);
     if (!loaded) {  // the loop as it is analysed: null space and dampers, too
@@ -155,7 +156,7 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
       const JointMatrix added =
           stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
       analysis::System<kMaxJoints> system;
-      NullSpace null_space(held.projector);
+      NullSpace null_space(held.projector, held.weights);
       null_space.compute(held.robot, held.impedance);
       Settings settings;
       settings.task_terms.load = load;
@@ -194,9 +195,10 @@ TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
       setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
       if (k % 4 > 1) setpoint.gains.directions[static_cast<std::size_t>(k / 4)] = false;
       held.impedance = Impedance(setpoint, 7);
-      held.projector = kNullProjectors[k / 4 % kNullProjectors.size()].second;
+      held.projector =
+          kNullProjectors[static_cast<std::size_t>(k) / 4 % kNullProjectors.size()].second;
       if (k % 3 == 0) held.approach_singularity(random);
-      NullSpace null_space(held.projector);
+      NullSpace null_space(held.projector, held.weights);
       null_space.compute(held.robot, held.impedance);
       const JointVector p = 0.2 * random.vector(7);
       if (null_space.unprojected()) {
@@ -257,11 +259,12 @@ TEST(LoadStiffness, OfDampersUnderWayIsTheirDerivative) {
       setpoint.gains.task_stiffness.setZero();
       setpoint.gains.null_damping = 2 * random.vector(7).cwiseAbs();
       setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
-      if (k % 4 > 1) held.projector = NullProjector::kKinematic;
+      held.projector =
+          kNullProjectors[static_cast<std::size_t>(k) / 2 % 3].second;  // not without one
       held.impedance = Impedance(setpoint, 7);
       held.hold();
       ImpedanceLaw law(held.model, {false, false, false, false, false});
-      NullSpace null_space(held.projector);
+      NullSpace null_space(held.projector, held.weights);
       null_space.compute(held.robot, held.impedance);
       if (null_space.of_projector().regularity() < 3e-3) continue;
       const JointVector qd = null_space.explained(random.vector(6));

@@ -258,8 +258,8 @@ TEST(Config, FillsLimits) {
 TEST(Config, FillsTheRest) {
   const Settings all =
       load(panda() +
-           "control: {load: tool_wrench, null_projector: none, jacobian_rate: true,\n"
-           "  subtract_friction: true}\n"
+           "control: {load: tool_wrench, null_projector: weighted, null_weights: 2,\n"
+           "  jacobian_rate: true, subtract_friction: true}\n"
            "environment: {tip_stiffness: [1, 2, 3, 4, 5, 6], tip_damping: [1 N s/mm, 0, 0, 0, 0, "
            "7],\n"
            "  joint_stiffness: 8, joint_damping: [1, 2, 3, 4, 5, 6, 7]}\n"
@@ -286,7 +286,8 @@ TEST(Config, FillsTheRest) {
   EXPECT_EQ(all.environment.joint_stiffness, VectorXd::Constant(7, 8));
   EXPECT_EQ(all.environment.joint_damping, VectorXd::LinSpaced(7, 1, 7));
   EXPECT_TRUE(all.task_terms.jacobian_rate);
-  EXPECT_EQ(all.null_projector, controller::NullProjector::kNone);
+  EXPECT_EQ(all.null_projector, controller::NullProjector::kWeighted);
+  EXPECT_EQ(all.null_weights, VectorXd::Constant(7, 2));
   EXPECT_TRUE(all.subtract_friction);
   EXPECT_EQ(all.motion.velocity, VectorXd::Ones(7));
   EXPECT_EQ(all.motion.acceleration, VectorXd::Constant(7, std::numbers::pi));

@@ -54,6 +54,7 @@ struct ReleasedTwin {
   void compare(bool sampled, int ticks, int every, Worst& worst) {
     controller::Settings settings = release_settings(twin, gains, loop.period);
     settings.null_projector = projector;
+    settings.null_weights = JointVector::LinSpaced(twin.dof(), 0.3, 3);
     sim::PlantOptions options;
     options.delay = loop.delay;
     options.torque_cutoff = loop.torque_cutoff;

@@ -33,7 +33,7 @@ export const crisp = forTask('crisp', ({design}, k, d, lost) => {
   return notes([lost, d.some((x) => x <= 0) && 'A damping that is not positive becomes 2 sqrt(k) there.',
     nullSpaceNote(design)]) + `cartesian_impedance_controller:\n    ros__parameters:\n${keys('k', k)}${keys('d', d)}` +
     `      nullspace.stiffness: ${decimal(design.null_stiffness[0] || 0)}\n` +
-    `      nullspace.projector_type: ${design.null_projector || 'dynamic'}\n`;
+    `      nullspace.projector_type: ${design.null_projector?.replace('weighted', 'kinematic') || 'dynamic'}\n`;
 });
 
 export const cartesianImpedance = forTask('Cartesian-Impedance-Controller', ({q, design}, k, d, lost) => {

@@ -12,7 +12,8 @@ export function nullDamping({null_damping: damping, null_stiffness: stiffness}) 
 }
 
 /// The projector of the null space where it is not the controller's own.
-const projector = ({null_projector: name}) => (name === 'dynamic' ? undefined : name);
+const projector = ({null_projector: name = 'dynamic', null_weights: weights}) => (name === 'dynamic' ? {}
+  : {null_projector: name, ...(name === 'weighted' && weights && {null_weights: weights})});
 
 /// The arm as keys of a configuration's `robot`: from the start of the program, with the changes of the page.
 function armKeys({setup, design}) {
@@ -43,7 +44,8 @@ export function configuration(of) {
   const unusual = (key, usual, name = key) =>
     (design[key] === usual && [undefined, usual].includes(loaded[key]) ? {} : {[name]: design[key]});
   const sampled = {...unusual('delay', 0), ...unusual('cutoff', 0), ...unusual('difference_velocity', false)};
-  const projected = [design, loaded].some(projector) ? {null_projector: design.null_projector || 'dynamic'} : {};
+  const projected = [design, loaded].some((one) => projector(one).null_projector)
+    ? {null_projector: 'dynamic', ...projector(design)} : {};
   const sections = {robot: {urdf, base, tip, ...armKeys(of)},
     control: {period: design.period, mode: design.mode, ...projected}, gains,
     limits: unusual('gain_margin', setup.usual_margin), integral: unusual('integral_time', 0, 'time'),
@@ -87,7 +89,7 @@ function gainOptions(design, stiffness, damping) {
     ...(prefix ? [] : [
       design.null_stiffness.some(Boolean) && `--null-stiffness ${design.null_stiffness.join(',')}`,
       null_damping.some(Boolean) && `--null-damping ${null_damping.join(',')}`,
-      projector(design) && `--null-projector ${design.null_projector}`,
+      ...Object.entries(projector(design)).map(([key, value]) => `--${key.replace('_', '-')} ${value}`),
       design.rotation === 'half-quaternion' && '--rotation half-quaternion',
       design.frame === 'tool' && '--frame tool'])];
 }
@@ -141,7 +143,7 @@ export function python(of) {
     ...(joint ? [] : [`null_stiffness=${json(design.null_stiffness)}`,
       rest.ratio ? `null_damping_ratio=${rest.ratio}` : `null_damping=${json(nullDamping(design))}`,
       `frame="${design.frame || 'base'}"`,
-      ...(projector(design) ? [`null_projector="${design.null_projector}"`] : [])])];
+      ...Object.entries(projector(design)).map(([key, value]) => `${key}=${json(value)}`)])];
   return notes([
     answer.damping_level && answer.damping_level.share < 1 &&
       `The sampled loop leaves less of the ratio, which this call does not count: ${kDiffers}`,

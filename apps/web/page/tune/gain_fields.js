@@ -16,7 +16,7 @@ const kDiagonal = ['diagonal', 'diagonal'], kFull = ['full', 'full matrix'];
 /// The words on which the form's fields depend; if they change, it is built again.
 export function structure(design) {
   const gains = [design.stiffness, design.joint_stiffness, design.damping, design.joint_damping, design.null_damping];
-  return [design.mode, ...gains.map(kindOf)].join();
+  return [design.mode, design.null_projector, ...gains.map(kindOf)].join();
 }
 
 /// A slider of the ratio or factor that gives the damping.
@@ -62,8 +62,11 @@ function nullSpaceFields(form, design, n) {
       : form.slider({label: 'damping', key: 'null_damping', unit: 'N m s/rad', low: 0.01, high: 100, log: true,
         get: () => design().null_damping[0], set: all('null_damping')}),
     form.choice({label: 'its projector', key: 'null_projector',
-      options: [['dynamic', 'dynamically consistent'], ['kinematic', 'pseudo-inverse'], ['none', 'none: in all joints']],
+      options: [['dynamic', 'dynamically consistent'], ['kinematic', 'pseudo-inverse'],
+        ['weighted', 'weighted pseudo-inverse'], ['none', 'none: in all joints']],
       ...at(design, 'null_projector', 'dynamic')}),
+    ...(design().null_projector !== 'weighted' ? [] : [form.list({label: 'its weights', key: 'null_weights', unit: '1',
+      count: n, ...at(design, 'null_weights', null)})]),
     form.check({label: '× inertia of tip', key: 'inertia_blocks', ...at(design, 'inertia_blocks', false)})];
 }
 
