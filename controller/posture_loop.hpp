@@ -108,6 +108,11 @@ class SampledArm {
 /// settings, without gravity and gears, keeps Limits::gain_margin and a reserve.
 DesignedDamping designed_damping(const RobotModel& model, const Settings& settings);
 
+/// Returns N (n x n), which projects joint velocities on those that leave the tip at rest;
+/// `weights` is W of the weighted projector, n, or without entries I.
+JointMatrix null_projector(const DynamicsResult& robot, NullProjector projector,
+                           const JointVector& weights = {}) noexcept;
+
 /// Returns a system whose size is not bounded by the type.
 analysis::System<> unbounded(const analysis::System<kMaxJoints>& system);
 

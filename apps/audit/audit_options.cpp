@@ -115,12 +115,7 @@ void read_options_gains(const AuditCommand& command, const RobotModel& model, Au
     gains.joint_damping =
         joints("--joint-damping", command.joint_damping, "N m s/rad", "N s/m").asDiagonal();
   }
-  if (!command.null_stiffness.empty()) {
-    gains.null_stiffness = joints("--null-stiffness", command.null_stiffness, "N m/rad", "N/m");
-  }
-  if (!command.null_damping.empty()) {
-    gains.null_damping = joints("--null-damping", command.null_damping, "N m s/rad", "N s/m");
-  }
+  take_null_space(command.arm, model, audit);
 }
 
 void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptions& audit,
@@ -133,7 +128,6 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
   read_options_gains(command, model, audit);
   if (command.mode == "joint") audit.mode = Mode::kJoint;
   if (!command.rotation.empty()) audit.half_quaternion = command.rotation == "half-quaternion";
-  command.arm.projector.take(model, audit.null_projector, audit.null_weights);
   if (command.frame == "tool") audit.gains.frame = controller::Frame::kTool;
   controller::Gains& gains = audit.gains;
   const double ratio =
@@ -285,10 +279,7 @@ CLI::Option* add_stated_options(CLI::App& command, AuditCommand& options) {
       ->check(CLI::IsMember({"vector", "half-quaternion"}));
   add("--frame", options.frame, "Axes of the gains", "base|tool (base)")
       ->check(CLI::IsMember({"base", "tool"}));
-  add("--null-stiffness", options.null_stiffness, "Of the motions that the task leaves free",
-      "a,b,...|x (0)");
-  add("--null-damping", options.null_damping, "Of the same", "a,b,...|x (0)");
-  arm.projector.add(command);
+  add_null_space_options(command, arm);
   add_model_options(command, arm);
   add_loop_options(command, options.timing);
   for (CLI::Option* option : command.get_options([&](const CLI::Option* one) {

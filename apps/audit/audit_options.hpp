@@ -16,7 +16,6 @@ struct AuditCommand {
   std::string preset, gains, mode;
   std::string stiffness, damping;              ///< 6 each
   std::string joint_stiffness, joint_damping;  ///< n each, or one number
-  std::string null_stiffness, null_damping;    ///< the same
   std::optional<double> damping_factor;
   std::string rotation, frame;
   controller::LoopTiming timing;

@@ -118,9 +118,10 @@ std::string friction_note(const ArmOptions& options, const RobotModel& model) {
 }
 
 bool ArmOptions::any() const {
-  for (const auto* text : {&base, &tip, &posture.q, &joint_stiffness, &task_stiffness,
-                           &task_damping, &viscous_friction, &null_damping, &reflected_inertia,
-                           &drives, &payload, &accept_inertias}) {
+  for (const auto* text :
+       {&base, &tip, &posture.q, &joint_stiffness, &task_stiffness, &task_damping,
+        &viscous_friction, &null_stiffness, &null_damping, &projector.name, &projector.weights,
+        &reflected_inertia, &drives, &payload, &accept_inertias}) {
     if (!text->empty()) return true;
   }
   return posture.outside_limits || gears.any();
@@ -155,9 +156,15 @@ SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
   }
   entry.loop = controller::SampledArm(model, {}).at(q);
   if (entry.loop.friction.size() > 0) entry.impedance.damping = entry.loop.friction;
-  if (const auto null =
-          per_joint("--null-damping", options.null_damping, model, "N m s/rad", "N s/m")) {
-    entry.add_null_damping(Eigen::MatrixXd(null->asDiagonal()));
+  controller::AuditOptions stated;
+  take_null_space(options, model, stated);
+  const controller::Gains& gains = stated.gains;
+  if (stiffness && gains.null_stiffness.size() + gains.null_damping.size() > 0) {
+    stated.gains.task_stiffness = stiffness->asDiagonal();
+    const analysis::TaskImpedance all = controller::Audit(model, stated).impedance(q);
+    entry.impedance.stiffness = all.stiffness;
+    entry.impedance.damping = all.damping;
+    entry.impedance.damping_error = all.damping_error;
   }
   if (damping) entry.impedance.task_damping = Eigen::MatrixXd(damping->asDiagonal());
   return entry;
@@ -197,6 +204,28 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
   add_gear_options(command, arm.gears);
   add_payload(command, arm.payload);
   add_accept_inertias(command, arm.accept_inertias);
+}
+
+void add_null_space_options(CLI::App& command, ArmOptions& arm) {
+  const auto add = [&](const char* name, std::string& text, const char* help) {
+    command.add_option(name, text, help)->option_text("a,b,...|x (0)");
+  };
+  add("--null-stiffness", arm.null_stiffness, "Of the motions that the task leaves free, N m/rad");
+  add("--null-damping", arm.null_damping, "Of the same, N m s/rad");
+  arm.projector.add(command);
+}
+
+void take_null_space(const ArmOptions& options, const RobotModel& model,
+                     controller::AuditOptions& stated) {
+  controller::Gains& gains = stated.gains;
+  const auto take = [&](const char* option, const std::string& text, const char* revolute,
+                        const char* prismatic, controller::JointVector& values) {
+    const auto given = per_joint(option, text, model, revolute, prismatic);
+    if (given) values = *given;
+  };
+  take("--null-stiffness", options.null_stiffness, "N m/rad", "N/m", gains.null_stiffness);
+  take("--null-damping", options.null_damping, "N m s/rad", "N s/m", gains.null_damping);
+  options.projector.take(model, stated.null_projector, stated.null_weights);
 }
 
 void add_loop_options(CLI::App& command, controller::LoopTiming& timing) {

@@ -2,7 +2,7 @@
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
-#include <dashpot/controller/posture_loop.hpp>
+#include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/robot_model.hpp>
 
 #include <CLI/App.hpp>
@@ -31,8 +31,9 @@ struct ArmOptions {
   std::string task_damping;     ///< diagonal of C_C before, 6; none if empty
   // Further properties, none if empty; n numbers, or one for all joints
   std::string viscous_friction;   ///< N m s/rad, or "urdf" or "drives" for what these have
-  std::string null_damping;       ///< of the motions that the task leaves free, N m s/rad
-  ProjectorOption projector;      ///< through which null-space gains act
+  std::string null_stiffness;     ///< of the motions that the task leaves free, N m/rad
+  std::string null_damping;       ///< of the same, N m s/rad
+  ProjectorOption projector;      ///< through which these act
   std::string reflected_inertia;  ///< kg m^2
   std::string drives;             ///< name of public figures
   GearOptions gears;
@@ -64,6 +65,12 @@ SystemEntry read_arm(const ArmOptions& options, const controller::RobotModel& mo
 
 /// Adds the options of the arm's inertia and friction: reflected inertia, payload and so on.
 void add_model_options(CLI::App& command, ArmOptions& arm);
+
+/// Adds the options of the null space.
+void add_null_space_options(CLI::App& command, ArmOptions& arm);
+/// Sets the gains of the null space and the projector that the options name.
+void take_null_space(const ArmOptions& options, const controller::RobotModel& model,
+                     controller::AuditOptions& stated);
 
 /// Adds the options of a loop except its period.
 void add_loop_options(CLI::App& command, controller::LoopTiming& timing);

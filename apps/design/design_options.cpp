@@ -35,8 +35,7 @@ void add_arm(CLI::App& command, ArmOptions& arm) {
       "x,y,z,rx,ry,rz");
   add("--task-damping,--damping", arm.task_damping, "Diagonal of the one before", "x,y,z,rx,ry,rz");
   add_model_options(command, arm);
-  add("--null-damping", arm.null_damping, "Damping of motions that the task leaves free, N m s/rad",
-      "a,b,...|x (0)");
+  add_null_space_options(command, arm);
 }
 
 void add_loop(CLI::App& command, DesignOptions& options) {

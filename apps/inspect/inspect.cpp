@@ -1,3 +1,4 @@
+#include <dashpot/apps/cli/arm_option.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
@@ -34,6 +35,7 @@ struct InspectOptions {
   PostureOption posture;
   std::string qd, gravity, reflected_inertia, drives, accept_inertias;
   GearOptions gears;
+  ProjectorOption projector;
   bool exclude_off_chain = false;
   bool json = false;
 };
@@ -82,6 +84,16 @@ const char* to_text(controller::JointType type) {
   return "";
 }
 
+/// Returns N of the options' projector in all directions of the tip, n x n; 0 x 0 without one.
+Eigen::MatrixXd projector_of(const InspectOptions& options, const RobotModel& model,
+                             const DynamicsResult& dynamics) {
+  controller::NullProjector projector = controller::NullProjector::kDynamic;
+  JointVector weights;
+  options.projector.take(model, projector, weights);
+  if (options.projector.name.empty()) return {};
+  return controller::null_projector(dynamics, projector, weights);
+}
+
 /// Returns the joints of the file; null for a limit that it does not set.
 Json json_joints(const RobotModel& model) {
   Json list = Json::array();
@@ -120,6 +132,9 @@ std::string to_json(const InspectOptions& options, const RobotModel& model,
                  {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
                  {"tip_position", json_list(dynamics.p_BT_B)},
                  {"tip_rotation", json_rows(dynamics.R_BT)}};
+  if (const Eigen::MatrixXd N = projector_of(options, model, dynamics); N.size() > 0) {
+    result["null_projector"] = json_rows(N);
+  }
   const controller::Settings settings = controller::default_settings(model);
   if (!settings.limits.torque.isZero(0)) {
     const Stopping stops = controller::stopping(model, settings, q);
@@ -240,19 +255,21 @@ std::string stop_table(const RobotModel& model, const JointVector& q) {
          matrix_table(rows, {"time, s", "way, rad or m"}, 2);
 }
 
-std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, const JointVector& q,
-                     const JointVector& qd) {
+std::string to_table(const InspectOptions& options, const RobotModel& model,
+                     const DynamicsResult& dynamics, const JointVector& q, const JointVector& qd) {
   std::vector<std::string> joints;
   for (int i = 1; i <= model.dof(); ++i) joints.push_back(std::to_string(i));
   const std::string n = std::to_string(model.dof());
   const std::string base = text::printable(model.base());
+  const Eigen::MatrixXd N = projector_of(options, model, dynamics);
   return text::printable(model.name()) + ": " + n + (model.dof() == 1 ? " joint" : " joints") +
          " from " + base + " to " + text::printable(model.tip()) + ". SI units, axes of " + base +
          ".\n\n" + joints_table(model, dynamics, q, qd) + "\nMass matrix\n" +
          matrix_table(dynamics.M, joints) + "\nJacobian at the tip\n" +
          matrix_table(dynamics.J,
                       {"linear x", "linear y", "linear z", "angular x", "angular y", "angular z"}) +
-         "\nTip\n" + tip_table(dynamics) + stop_table(model, q);
+         (N.size() > 0 ? "\nNull-space projector\n" + matrix_table(N, joints) : "") + "\nTip\n" +
+         tip_table(dynamics) + stop_table(model, q);
 }
 
 void run_inspect(const InspectOptions& options) {
@@ -270,7 +287,7 @@ void run_inspect(const InspectOptions& options) {
   const DynamicsResult dynamics = controller::evaluate(model, q, qd);
   warn_of(model);
   print(options.json ? to_json(options, model, dynamics, q)
-                     : to_table(model, dynamics, q, qd) + rotors_text(options, model));
+                     : to_table(options, model, dynamics, q, qd) + rotors_text(options, model));
 }
 
 }  // namespace
@@ -297,6 +314,7 @@ void add_inspect(CLI::App& program) {
       "a,b,... (0)");
   add("--drives", &InspectOptions::drives, kDrivesHelp, "NAME")->check(not_empty());
   add_gear_options(*command, options->gears);
+  options->projector.add(*command);
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
   add_accept_inertias(*command, options->accept_inertias);

@@ -161,6 +161,17 @@ DesignedDamping designed_damping(const RobotModel& model, const Settings& settin
   return DesignedDamping(subtracted, borne, settings.null_projector, settings.null_weights);
 }
 
+JointMatrix null_projector(const DynamicsResult& robot, NullProjector projector,
+                           const JointVector& weights) noexcept {
+  Impedance tip(static_cast<int>(robot.M.rows()));
+  tip.base.selected.setOnes();
+  NullSpace null_space(projector, weights);
+  null_space.compute(robot, tip);
+  JointMatrix N(robot.M.rows(), robot.M.cols());
+  null_projector(null_space, N);
+  return N;
+}
+
 analysis::System<> unbounded(const analysis::System<kMaxJoints>& system) {
   analysis::System<> result(system.dof());
   result.mass = system.mass;

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ._core import Error
 from ._results import Array, Result, to_numbers
-from ._robot import Robot, check_postures, gains_text
+from ._robot import Robot, check_postures, gains_text, known_projector
 from ._workers import Task, chunks_of, collect, workers
 
 
@@ -39,7 +39,8 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
                   task_stiffness: npt.ArrayLike | None = None,
                   joint_stiffness: npt.ArrayLike | None = None,
                   null_stiffness: npt.ArrayLike | None = None,
-                  null_damping: npt.ArrayLike | None = None, frame: str = "base",
+                  null_damping: npt.ArrayLike | None = None, null_projector: str = "dynamic",
+                  null_weights: npt.ArrayLike | None = None, frame: str = "base",
                   half_quaternion: bool = False, structure: str = "full",
                   largest_ratio: float | None = None, soft_frequency: float = 0.1,
                   samples: int = 0, seed: int = 0, lower: npt.ArrayLike | None = None,
@@ -78,6 +79,7 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     gains = gains_text(joint_stiffness=joint_stiffness, task_stiffness=task_stiffness,
                        null_stiffness=null_stiffness, null_damping=null_damping, task_frame=frame)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": False,
+                               **known_projector(null_projector, null_weights),
                                "period": float(period), "delay": int(delay),
                                "cutoff": float(cutoff),
                                "difference_velocity": bool(difference_velocity),

@@ -89,6 +89,26 @@ TEST(DesignBesideWhatIsThere, NullSpaceDampingLeavesTheDesignAlone) {
   EXPECT_LT(with["after"]["zero_mode_rates"][0], -1);
 }
 
+// Without a projector springs of the joints stiffen the modes of the tip, which damping at the tip
+// alone then does not reach.
+TEST(DesignBesideWhatIsThere, CountsSpringsThroughTheProjectorThatActs) {
+  const Json none = panda({"--null-stiffness", "20", "--null-projector", "none"});
+  const Json dynamic = panda({"--null-stiffness", "20"}), of_tip = panda({});
+  const auto fastest = [](const Json& found) {
+    return found["before"]["modes"][0]["natural_frequency"].get<double>();
+  };
+  EXPECT_EQ(none["modes"].size(), 7U);
+  EXPECT_EQ(dynamic["modes"].size(), 7U);
+  EXPECT_EQ(none["misses"].size(), 7U);
+  EXPECT_EQ(dynamic["misses"].size(), 1U);  // the elbow, which C_C does not move
+  EXPECT_NEAR(fastest(dynamic), fastest(of_tip), 1e-9);
+  EXPECT_GT(fastest(none), 1.05 * fastest(of_tip));
+  const MatrixXd C = matrix(of_tip["task_damping"]);
+  const Json few = panda({"--null-damping", "1", "--null-projector", "kinematic"});
+  EXPECT_LT((matrix(dynamic["task_damping"]) - C).norm(), 1e-6 * C.norm());
+  EXPECT_GT((matrix(few["task_damping"]) - C).norm(), 1e-3 * C.norm());
+}
+
 const std::string kSix =
     "mass: [[2,0,0,0,0,0],[0,2,0,0,0,0],[0,0,2,0,0,0],[0,0,0,1,0,0],[0,0,0,0,1,0],[0,0,0,0,0,1]]\n"
     "jacobian: [[1,0,0,0,0,0],[0,1,0,0,0,0],[0,0,1,0,0,0],[0,0,0,1,0,0],[0,0,0,0,1,0],"

@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -101,6 +102,36 @@ TEST(Inspect, TakesTheMiddleOfTheLimitsAndEarthsGravityUnlessToldOtherwise) {
   for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_EQ(upside_down["gravity"][i].get<double>(), -plain["gravity"][i].get<double>());
   }
+}
+
+TEST(Inspect, PrintsTheProjectorOfTheNullSpaceThatIsNamed) {
+  using Eigen::MatrixXd;
+  const auto matrix = [](const Json& rows) {
+    MatrixXd A(rows.size(), rows[0].size());
+    for (Eigen::Index i = 0; i < A.size(); ++i) {
+      A(i / A.cols(), i % A.cols()) =
+          rows[static_cast<std::size_t>(i / A.cols())][static_cast<std::size_t>(i % A.cols())];
+    }
+    return A;
+  };
+  for (const std::string name : {"dynamic", "kinematic", "weighted", "none"}) {
+    SCOPED_TRACE(name);
+    Words words = {"--json", "--q", "0.1,-0.8,0.2,-2.1,0.3,1.6,0.4", "--null-projector", name};
+    if (name == "weighted") words = joined(words, {"--null-weights", "1,2,3,4,5,6,7"});
+    const Json found = parse(inspect_panda(words));
+    const MatrixXd N = matrix(found["null_projector"]), J = matrix(found["jacobian"]);
+    MatrixXd W = MatrixXd::Identity(7, 7);
+    if (name == "dynamic") W = matrix(found["mass_matrix"]);
+    if (name == "weighted") W.diagonal() = Eigen::VectorXd::LinSpaced(7, 1, 7);
+    const MatrixXd V = W.inverse() * J.transpose();
+    const MatrixXd wanted = MatrixXd::Identity(7, 7) - V * (J * V).inverse() * J;
+    EXPECT_LT((N - (name == "none" ? MatrixXd::Identity(7, 7) : wanted)).norm(), 1e-9);
+    words.front() = "--outside-limits";
+    EXPECT_THAT(inspect_panda(words).out, HasSubstr("Null-space projector\n"));
+  }
+  EXPECT_THAT(inspect_panda({"--null-weights", "1"}).err,
+              HasSubstr("goes with --null-projector weighted"));
+  EXPECT_FALSE(parse(inspect_panda({"--json"})).contains("null_projector"));
 }
 
 TEST(Inspect, ListsTheJointsWithTheirLimits) {
