@@ -78,6 +78,9 @@ RobotModel read_model(const ArmOptions& options) try {
   controller::ModelOptions model;
   take_accepted(options.accept_inertias, model);
   take_drives(options.drives, model);
+  if (const auto gravity = quantities("--gravity", options.gravity, Units(3, "m/s^2"))) {
+    model.gravity = *gravity;
+  }
   const RobotModel plain =
       RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   const auto inertia =
@@ -121,7 +124,7 @@ bool ArmOptions::any() const {
   for (const auto* text :
        {&base, &tip, &posture.q, &joint_stiffness, &task_stiffness, &task_damping,
         &viscous_friction, &null_stiffness, &null_damping, &projector.name, &projector.weights,
-        &reflected_inertia, &drives, &payload, &accept_inertias}) {
+        &gravity, &reflected_inertia, &drives, &payload, &accept_inertias}) {
     if (!text->empty()) return true;
   }
   return posture.outside_limits || gears.any();
@@ -198,6 +201,7 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
   };
   add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
       "a,b,...|x|urdf|drives (0)");
+  add("--gravity", arm.gravity, "In axes of the file's root link, m/s^2", "x,y,z (0,0,-9.81)");
   add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
       "a,b,...|x (0)");
   command.add_option("--drives", arm.drives, kDrivesHelp)->option_text("NAME")->check(not_empty());

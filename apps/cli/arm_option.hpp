@@ -34,6 +34,7 @@ struct ArmOptions {
   std::string null_stiffness;     ///< of the motions that the task leaves free, N m/rad
   std::string null_damping;       ///< of the same, N m s/rad
   ProjectorOption projector;      ///< through which these act
+  std::string gravity;            ///< in the axes of the root link, m/s^2
   std::string reflected_inertia;  ///< kg m^2
   std::string drives;             ///< name of public figures
   GearOptions gears;

@@ -65,6 +65,17 @@ TEST(Audit, HasTheSpringsOfTipAndJointsOfPolymetis) {
               HasSubstr("polymetis has gains for seven joints, the arm has 6"));
 }
 
+/// The margin counts how late gravity is compensated, and modes do not.
+TEST(Audit, TakesTheGravityOfAnyMount) {
+  const auto posture = [](const Words& more) {
+    return audit_json(joined({"--preset", "libfranka", "--period", "1ms"}, more))["posture"];
+  };
+  const Json upright = posture({}), wall = posture({"--gravity", "9.81,0,0"});
+  EXPECT_EQ(posture({"--gravity", "0,0,-9.81"}), upright);
+  EXPECT_EQ(wall["modes"], upright["modes"]);
+  EXPECT_NE(wall["gain_margin"], upright["gain_margin"]);
+}
+
 /// Its slowest mode, 2.386 rad/s with a ratio of 0.25, is unstable with an integral below 0.84 s.
 TEST(Audit, CountsAnIntegralAndTellsHowItsSlowModesDecay) {
   const std::vector<std::string> options = {"--preset", "deoxys",    "--period",
@@ -237,7 +248,7 @@ TEST(AuditTable, IsPrintedForEachPreset) {
                            DASHPOT_PROGRAM + " 20 >" + scratch.path("out") + " 2>&1";
   ASSERT_EQ(std::system(line.c_str()), 0) << scratch.read("out");
   const std::string text = scratch.read("out");
-  EXPECT_EQ(count_lines(text), 2 * 12 + 10 + 1 + 13);
+  EXPECT_EQ(count_lines(text), 2 * 13 + 10 + 1 + 13);
   EXPECT_THAT(text, HasSubstr("| `libfranka` | 1 | 0.394, 0.455, 0.512 |"));
   EXPECT_THAT(text, HasSubstr("| `fr3` | 0.195, 0.195, 0.195, 0.195, 0.074, 0.074, 0.074 |"));
 }

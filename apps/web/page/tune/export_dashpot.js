@@ -72,7 +72,7 @@ function armOptions(of) {
   const {mass, center, inertia: I} = keys.payload || {};
   const list = (name, values) => values && `--${name} ${values.join(',')}`;
   return [`--urdf ${quoted(urdf)} --base ${quoted(base)} --tip ${quoted(tip)}`,
-    list('reflected-inertia', rotors(of)),
+    list('gravity', keys.gravity), list('reflected-inertia', rotors(of)),
     list('viscous-friction', keys.viscous_friction || model.viscous_friction),
     list('gear-stiffness', keys.gear_stiffness), list('gear-damping', keys.gear_damping),
     keys.gear_stiffness && keys.position_sensor === 'link' && '--position-sensor link',
