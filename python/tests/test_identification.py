@@ -131,7 +131,7 @@ def test_finds_the_modes_of_motion_under_a_measured_input():
             dashpot.identify(t[0], y[0], input=bad)
     with pytest.raises(dashpot.Error, match="2 arrays of times, 1 of inputs"):
         dashpot.identify(t, y, input=u[:1])
-    with pytest.raises(dashpot.Error, match="not measured"):
+    with pytest.raises(dashpot.Error, match="no measured input"):
         dashpot.identify(t[0], y[0], input=u[0], ambient=True)
 
 

@@ -204,7 +204,7 @@ def test_an_arm_that_needs_its_brakes_is_named_once(tmp_path, capfd):
     ({"prefix": "other_"}, "the model has no joint 'other_panda_joint1'"),
     ({"goal": "moon"}, "the model has no body 'moon'"),
     ({"integrator": "RK4"}, "RK4 has states between steps"),
-    ({"period": "1.5 ms"}, "no multiple of the model's timestep"),
+    ({"period": "1.5 ms"}, "is not a multiple of the model's timestep"),
     ({"release": "0"}, "'0' is not an index of userdata, which has 0 numbers"),
     ({"release": "1x"}, "'1x' is not an index of userdata"),
     ({"lcm_url": "nonsense"}, "nonsense")])
