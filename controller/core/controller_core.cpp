@@ -157,9 +157,9 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     const NullSpace& null_space = designed_.null_space();
     generator_.step(setpoints_, hold, sensed_, null_space);
     const ImpedanceLaw::Input law{
-        sensed_.robot,           sensed_.q,          sensed_.qd,
-        impedance,               null_space,         generator_.references(),
-        generator_.clamp(),      setpoints_.wrench(), integral_.on() ? &integral_ : nullptr};
+        sensed_.robot,      sensed_.q,           sensed_.qd,
+        impedance,          null_space,          generator_.references(),
+        generator_.clamp(), setpoints_.wrench(), integral_.on() ? &integral_ : nullptr};
     law_.torque(law, asked_);
     if (tank_.on() && tank_.limit(law, sensed_.weight, asked_)) {
       status = worse(status, Status::kTorqueLimited);
@@ -241,8 +241,8 @@ LoopAnalysis::Loop ControllerCore::loop() const noexcept {
   return {snapshot_.tick,
           sensed_,
           springs ? tank_.share() : 0,
-          {springs ? tank_.active(designed_.now(setpoints_.gains().now())) : brake_, designed_.null_space(),
-           springs ? friction_left_ : viscous_friction_, wrenches, posture},
+          {springs ? tank_.active(designed_.now(setpoints_.gains().now())) : brake_,
+           designed_.null_space(), springs ? friction_left_ : viscous_friction_, wrenches, posture},
           setpoints_.changes(),
           setpoints_.attachment().now()};
 }

@@ -256,9 +256,9 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   }
   snapshot.tip_error = numbers.vector(6);
   snapshot.tip_wrench = numbers.vector(6);
-  for (double* value : {&snapshot.joint_damping_ratio, &snapshot.task_damping_ratio,
-                        &snapshot.damping_level, &snapshot.energy_store,
-                        &snapshot.spring_share, &snapshot.payload.mass}) {
+  for (double* value :
+       {&snapshot.joint_damping_ratio, &snapshot.task_damping_ratio, &snapshot.damping_level,
+        &snapshot.energy_store, &snapshot.spring_share, &snapshot.payload.mass}) {
     *value = numbers();
   }
   snapshot.payload.center = numbers.vector(3);

@@ -63,7 +63,8 @@ struct Held {
   bool good() const {
     constexpr int kFew = 40;  // of one record or two, whose errors belong together
     const double chance = 2 * std::sqrt(kNominal * (1 - kNominal) * all);
-    return all < kFew || (inside >= kLeastHeld * all - chance && inside <= kMostHeld * all + chance);
+    return all < kFew ||
+           (inside >= kLeastHeld * all - chance && inside <= kMostHeld * all + chance);
   }
 };
 

@@ -24,8 +24,8 @@ struct Seen {
     free = std::max(free, unbound.most / arm.store);
   }
   bool print(const char* engine) const {
-    std::printf("| %s | %d | %d, %.6f | %d | %d, %.0f |\n", engine, policies, broken, most, weakened,
-                beyond, free);
+    std::printf("| %s | %d | %d, %.6f | %d | %d, %.0f |\n", engine, policies, broken, most,
+                weakened, beyond, free);
     return broken == 0 && (policies < 10 || beyond > 0);
   }
 };

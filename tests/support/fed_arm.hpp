@@ -6,8 +6,8 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
-#include <dashpot/tests/support/mujoco_arm.hpp>
 #include <dashpot/tests/support/dice.hpp>
+#include <dashpot/tests/support/mujoco_arm.hpp>
 #include <dashpot/tests/support/twin_models.hpp>
 
 #include <algorithm>
@@ -73,7 +73,8 @@ struct FedArm {
     }
   }
 
-  /// What the motors gave at most beyond weight and friction, J, and the least share of the springs.
+  /// What the motors gave at most beyond weight and friction, J, and the least share of the
+  /// springs.
   struct Fed {
     double most = 0, share = 1;
     int braked = 0;  ///< ticks without springs
