@@ -27,7 +27,7 @@ struct ContactAt {
 /// The largest force of the joints in a direction, beside the weight of the arm.
 struct HeldForce {
   Eigen::Vector3d direction;  ///< in which the tip presses, of length 1, in the base's axes
-  /// At which the first joint reaches its effort limit, N; infinite: no joint bears it, NaN: the
+  /// At which the first joint reaches its effort limit, N; infinite: no joint carries it, NaN: the
   /// limits of all that do are unknown.
   double force = 0;
   int joint = -1;  ///< the joint at its limit, from 0; -1: none

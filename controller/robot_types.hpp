@@ -83,7 +83,8 @@ enum class NullProjector : std::uint8_t {
   kDynamic,    ///< X = M^-1 J' (J M^-1 J')^-1: nothing that acts there moves the tip
   kKinematic,  ///< X the pseudo-inverse J' (J J')^-1: a tip at rest under no load feels nothing
   kWeighted,   ///< X = W^-1 J' (J W^-1 J')^-1 with a constant diagonal W; kKinematic has W = I
-  kNone,       ///< X = 0: springs in all joints beside those of the tip, on arms of any joints
+  kNone,  ///< X = 0: joint springs in all directions beside the springs of the tip, on arms of any
+          ///< joints
 };
 /// Their names, in the order of the enumerators.
 inline constexpr std::array<std::pair<std::string_view, NullProjector>, 4> kNullProjectors = {
@@ -94,7 +95,7 @@ inline constexpr std::array<std::pair<std::string_view, NullProjector>, 4> kNull
 inline constexpr std::string_view name_of(NullProjector projector) noexcept {
   return kNullProjectors[static_cast<std::size_t>(projector)].first;
 }
-/// Returns the projector of a name; kDynamic of a name that is none.
+/// Returns the projector of a name; kDynamic if there is no such name.
 inline constexpr NullProjector null_projector_of(std::string_view name) noexcept {
   for (const auto& [of, projector] : kNullProjectors) {
     if (of == name) return projector;

@@ -10,8 +10,8 @@ namespace dashpot::apps {
 /// Designs one matrix for a list of configurations. Returns it though it keeps no margin.
 using RegionSearch = std::function<RegionReport(const SystemFile&)>;
 
-/// Finds one matrix that gives the ratio wanted in the air and against every stiffness up to that
-/// of --contact, or up to the largest where it does. `air` has a configuration for each posture of
+/// Finds one matrix that gives the ratio wanted in the air and against every stiffness up to
+/// --contact, or up to the largest where it does. `air` has a configuration for each posture of
 /// the model.
 RegionReport design_for_contact(const DesignOptions& options, const SystemFile& air,
                                 const controller::RobotModel& model,

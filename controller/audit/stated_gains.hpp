@@ -17,9 +17,9 @@ int checked_rank(const std::string& name, const Eigen::MatrixXd& stiffness);
 /// with the member's name and the reason.
 Impedance stated_impedance(const AuditOptions& stated, int n);
 
-/// Returns AuditOptions::settings, or those of a controller that designs damping for the ratios of
-/// `options`; none without a ratio. Throws std::invalid_argument for a law that Controller does not
-/// have.
+/// Returns AuditOptions::settings, or the settings of a controller that designs damping for the
+/// ratios of `options`; none without a ratio. Throws std::invalid_argument for a law that
+/// Controller does not have.
 std::optional<Settings> designing_settings(const RobotModel& model, const AuditOptions& options);
 
 }  // namespace dashpot::controller

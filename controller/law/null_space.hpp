@@ -26,8 +26,8 @@ namespace dashpot::controller {
 /// but a torque N' t accelerates the tip, because N is orthogonal in W and not in energy. All else
 /// is as above: the damping for a ratio, the joint velocity of a twist, the inertia.
 ///
-/// NullProjector::kNone has N = I: its springs and dampers are those of joints, which act on the
-/// tip as well. The damping for a ratio has P = I, and, with Impedance::common_ratio, K_0 + J' K_C
+/// NullProjector::kNone has N = I: its springs and dampers act in all joints, and so on the tip as
+/// well. The damping for a ratio has P = I, and, with Impedance::common_ratio, K_0 + J' K_C
 /// J for K_0.
 class NullSpace {
  public:

@@ -119,7 +119,7 @@ TEST(DesignForContact, RefusesWhatDoesNotGoTogether) {
   expect_refusals(arm, {{{"--direction", "z"}, "--direction: needs --contact"},
                         {{"--contact", "-1"}, "--contact: a stiffness up to 1e12"},
                         {{"--contact", "1", "--direction", "0,0,0"}, "--direction: is zero"},
-                        {{"--contact", "1", "--sensitivity"}, "does not go with --contact"}});
+                        {{"--contact", "1", "--near"}, "does not go with --contact"}});
 }
 
 }  // namespace

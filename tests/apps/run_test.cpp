@@ -47,7 +47,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                                            "panda_release_ratio_damping", "panda_push_free",
                                            "panda_push_held", "panda_pick_up", "panda_late_torque",
                                            "panda_projector", "iiwa14", "iiwa14_knocks", "ur5",
-                                           "baxter_left", "chain3"));
+                                           "baxter_left", "chain3", "touch"));
 
 TEST(Release, IsToldWithTheSharesOfItsModes) {
   const Json release = run_json(scene("panda_release_c1"), {"--duration", "0.01"})["release"];
@@ -67,7 +67,7 @@ TEST(Scenes, AreAllTested) {
        std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes")) {
     files += entry.path().extension() == ".yaml" ? 1 : 0;
   }
-  EXPECT_EQ(files, 14U);  // as in EveryScene
+  EXPECT_EQ(files, 15U);  // as in EveryScene
 }
 
 /// The example has every key that the reader names as known.
