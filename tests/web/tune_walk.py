@@ -1,6 +1,7 @@
 """Walks through the task of the paper's Discussion on the page of `dashpot tune`: PROGRAM SOURCE_DIRECTORY FOLDER.
 
-Prints the ratios on the way, and writes the pictures tune.png, tune-1.png and tune-2.png of the documents to the folder.
+Prints the ratios on the way, and writes the pictures tune.png, tune-1.png and tune-2.png of the documents to the
+folder.
 """
 import base64
 import os

@@ -59,7 +59,8 @@ function loopWords(name, found) {
     assumes.length > 0 && `The loop of ${name} assumes: ${assumes.join(', ')}`,
     limit && `${name} is limited by a motion at ${number(limit.frequency, 3)} rad/s` +
       `${limit.joint ? `, most of it in ${limit.joint}` : ''}`,
-    contact && `${name} has its lowest limit along (${contact.direction.map((x) => number(x, 2)).join(', ')})`].filter(Boolean);
+    contact &&
+      `${name}: lowest limit along (${contact.direction.map((x) => number(x, 2)).join(', ')})`].filter(Boolean);
 }
 
 export function fillComparison(page) {
