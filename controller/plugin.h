@@ -69,8 +69,7 @@ typedef struct dashpot_controller dashpot_controller;
  * Below zero: the call was refused and did nothing. */
 enum {
   DASHPOT_OK = 0,
-  DASHPOT_TORQUE_LIMITED =
-      1, /* a limit of torque, torque rate, power, speed or energy is at work */
+  DASHPOT_TORQUE_LIMITED = 1,     /* a limit of torque, its rate, power, speed or energy acts */
   DASHPOT_NEAR_JOINT_LIMIT = 2,   /* a joint is kept from going beyond a position limit */
   DASHPOT_LITTLE_MARGIN = 3,      /* springs too stiff for the sampled loop: no damping ratio, or no
                                       lower one, keeps limits.gain_margin here */

@@ -117,6 +117,14 @@ JointVector determined(const Config& config, const ModelCheck& check, ArmFigure 
   return result;
 }
 
+std::string kept_rotor(std::size_t j, const Joint& joint, const Estimate& found) {
+  const std::string unit = joint.type == controller::JointType::kPrismatic ? " kg" : " kg m^2";
+  return "joint " + std::to_string(j + 1) + ": its reflected inertia stays " +
+         text::number(joint.reflected_inertia, 3) + unit + " though the records show none (" +
+         text::number(found.value, 2) + " +- " + text::number(found.deviation, 2) + unit +
+         "), as torque sensors behind the gear do; if yours are on the motor's side, write 0";
+}
+
 std::vector<std::string> kept_rotors(const Config& config, const CheckModelReport& report) {
   std::vector<std::string> kept;
   for (std::size_t j = 0; j < report.check.joints.size(); ++j) {
@@ -124,12 +132,7 @@ std::vector<std::string> kept_rotors(const Config& config, const CheckModelRepor
     const Joint& joint = config.model.joints()[j];
     const double known = joint.reflected_inertia;
     if (is_taken(one, known, ArmFigure::kReflectedInertia) || !refutes(one, known)) continue;
-    const std::string unit = joint.type == controller::JointType::kPrismatic ? " kg" : " kg m^2";
-    kept.push_back("joint " + std::to_string(j + 1) + ": its reflected inertia stays " +
-                   text::number(known, 3) + unit + " though the records show none (" +
-                   text::number(one.value, 2) + " +- " + text::number(one.deviation, 2) + unit +
-                   "), as torque sensors behind the gear do; if yours are on the motor's side, "
-                   "write 0");
+    kept.push_back(kept_rotor(j, joint, one));
   }
   return kept;
 }

@@ -41,8 +41,19 @@ Attributes found_attributes(const Config& config, const CheckModelReport& report
 
 std::string written(const Attributes& attributes) {
   std::string text;
-  for (const auto& [name, value] : attributes) text += " " + name + "=\"" + value + "\"";
+  for (const auto& [name, value] : attributes) {
+    text.append(" ").append(name).append("=\"").append(value).append("\"");
+  }
   return text;
+}
+
+InputError missing_joint(const std::string& mjcf, const std::string& name) {
+  return {"--mjcf", mjcf + ": has no joint '" + name + "' in this file"};
+}
+
+InputError ambiguous_joint(const std::string& mjcf, const std::string& name, const std::string& one,
+                           const std::string& other) {
+  return {"--mjcf", mjcf + ": joint '" + name + "' may be '" + one + "' or '" + other + "'"};
 }
 
 /// Has the attributes of a tag replaced or added.
@@ -124,14 +135,11 @@ TextChanges mjcf_changes(const std::string& text, const std::string& mjcf, const
     for (auto at = joints.begin(); at != joints.end() && !joints.contains(name); ++at) {
       if (!is_same(name, at->first)) continue;
       if (found != joints.end()) {
-        throw InputError("--mjcf", mjcf + ": joint '" + name + "' may be '" + found->first +
-                                       "' or '" + at->first + "'");
+        throw ambiguous_joint(mjcf, name, found->first, at->first);
       }
       found = at;
     }
-    if (found == joints.end()) {
-      throw InputError("--mjcf", mjcf + ": has no joint '" + name + "' in this file");
-    }
+    if (found == joints.end()) throw missing_joint(mjcf, name);
     set_attributes(text, found->second, found_attributes(config, report, j, kNames), changes);
   }
   return changes;

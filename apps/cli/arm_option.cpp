@@ -175,6 +175,7 @@ SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
 
 void ProjectorOption::add(CLI::App& command) {
   std::vector<std::string> names;
+  names.reserve(controller::kNullProjectors.size());
   for (const auto& [of, projector] : controller::kNullProjectors) names.emplace_back(of);
   command.add_option("--null-projector", name, "Through which null-space gains act")
       ->option_text("dynamic|kinematic|weighted|none (dynamic)")

@@ -62,6 +62,7 @@ RegionReport design_for_contact(const DesignOptions& options, const SystemFile& 
                                 const RegionSearch& search) {
   constexpr double kNear = 1.03, kLeast = 1;  // of the stiffness that is sought; N/m
   std::vector<MatrixXd> J;
+  J.reserve(postures.size());
   for (const JointVector& q : postures) {
     J.emplace_back(controller::evaluate(model, q, JointVector::Zero(q.size())).J.topRows<3>());
   }

@@ -150,7 +150,10 @@ nb::dict joint_properties(const Robot& robot) {
 void add_robot(nb::module_& m) {
   using Vector = Eigen::VectorXd;
   m.def("published_drives", &published_drives);
-  m.def("has_own_friction", &controller::has_own_friction, nb::arg("drives"));
+  m.def(
+      "has_own_friction",
+      [](const std::string& drives) { return controller::has_own_friction(drives); },
+      nb::arg("drives"));
   m.def(
       "read_urdf", [](const std::string& path) { return controller::read_urdf_file(path); },
       nb::arg("path"));
