@@ -107,7 +107,8 @@ def test_a_kinematic_null_space_acts_through_the_pseudo_inverse(panda):
         weighted = dict(null_projector="weighted", null_weights=np.diag(W))
         loop = dashpot.closed_loop(panda, q, **damped, **null_space, **weighted)
         np.testing.assert_allclose(loop.stiffness, J.T @ K_C @ J + 10 * N.T @ N, atol=1e-9 * abs(K).max())
-        stated = dashpot.audit(panda, q, **GAINS, **null_space, **weighted).posture.modes
+        stated = dashpot.audit(panda, q, **GAINS, **null_space, **weighted,
+                               urdf_friction=True).posture.modes
         np.testing.assert_allclose(stated.natural_frequency, loop.modes.natural_frequency, rtol=1e-4)
         for wrong in (dict(weighted, null_weights=[0.0] * 7), dict(null_weights=[1.0] * 7)):
             with pytest.raises(dashpot.Error, match="null_weights"):
