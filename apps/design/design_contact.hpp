@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/apps/design/design_options.hpp>
-#include <dashpot/apps/design/design_report.hpp>
+#include <dashpot/apps/design/region_report.hpp>
 
 #include <functional>
 #include <vector>

@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/analysis/damping_sampled.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/system_report.hpp>
 
 #include <optional>
@@ -33,34 +33,15 @@ struct DesignReport {
   bool gears = false;                ///< elastic, in `before` and `after`, but not in `design`
 };
 
-/// What the tip touches in a configuration: a spring, N/m, along a direction; 0: nothing.
-struct RegionTouch {
-  double stiffness = 0;
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-};
-
-/// What `dashpot design --region` and `--contact` say.
-struct RegionReport {
-  std::string key;
-  double ratio = 0;
-  analysis::RegionDesign design;
-  std::vector<std::string> assumes = {};
-  std::vector<controller::JointVector> postures = {};  ///< of an arm, one for each sample
-  std::optional<analysis::LoopLimit> limit = {};  ///< none if the loops are taken for continuous
-  std::vector<RegionTouch> touches = {};          ///< one for each sample; none without --contact
-  double asked_contact = 0;                       ///< N/m
-  double sampled_ratio = 0;  ///< with --contact, the smallest of all loops; 0 without a period
-  std::optional<double> contact = {};  ///< up to which the ratio holds, N/m; none: nowhere
-};
-
 std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
 std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
-std::string region_json(const RegionReport& report);
-std::string region_table(const RegionReport& report);
-/// Returns why the damping is not as wanted: less than a tenth of the ratio somewhere, or more than
-/// is allowed. Empty if it is.
-std::string region_complaint(const RegionReport& report);
-/// The map of the worst mode: a line of headings, then one for each configuration.
-std::string region_csv(const RegionReport& report);
+
+// Parts of reports on one design and on a region.
+double smallest_eigenvalue(const Eigen::MatrixXd& A);
+/// Returns the keys of a loop and its margin, without those that follow from them.
+Json limit_value(const analysis::LoopLimit& limit, double gain_margin);
+/// Returns the matrix in aligned columns; entries within the rounding of the largest are 0.
+std::string matrix_text(const Eigen::MatrixXd& matrix);
+std::string loop_margin_text(double gain_margin);
 
 }  // namespace dashpot::apps
