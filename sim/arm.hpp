@@ -33,8 +33,8 @@ struct ArmOptions {
   PositionSensor position_sensor = PositionSensor::kMotor;  ///< of joints with elastic gears
   std::optional<Contact> stops;  ///< at the position limits; N m/rad and N m s/rad (N/m, N s/m)
   std::optional<Wall> wall;
-  /// What the wall is made of meanwhile instead; the energy of what is pressed in counts as the
-  /// world's work.
+  /// Stiffness and damping of the wall for some time; energy of a wall that is pressed in as they
+  /// change counts as the world's work.
   std::vector<Piece<Contact>> tables;
   std::vector<Piece<Vector6>> wrenches;  ///< of the world on the tip, at its origin, in base axes
   /// Bodies rigid at the tip, in its axes, beside the robot's payload: picked up at `begin`, put

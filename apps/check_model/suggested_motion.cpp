@@ -97,7 +97,7 @@ std::optional<TorqueRecord> simulate(const std::string& path, const Config& conf
   for (Index j = 0; j < parameters.reflected_inertia.size(); ++j) {
     const identification::Estimate& one =
         report.check.joints[static_cast<std::size_t>(j)].reflected_inertia;
-    // What is not determined, and a joint that never moved, has at least what may be.
+    // A rotor that is not determined, or whose joint never moved, has at least its deviation.
     double& inertia = parameters.reflected_inertia[j];
     if (!one.determined && std::isfinite(one.deviation)) {
       inertia = std::max(one.value, one.deviation);

@@ -28,7 +28,7 @@ std::string_view attribute(const XmlTag& tag, std::string_view name) {
   return {};
 }
 
-/// What was found of joint j, as attributes of these names, in the order of ArmFigure.
+/// Returns the figures found of joint j as attributes; `names` in the order of ArmFigure.
 Attributes found_attributes(const Config& config, const CheckModelReport& report, std::size_t j,
                             const std::array<const char*, kArmFigures.size()>& names) {
   Attributes found;

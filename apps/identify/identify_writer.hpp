@@ -65,7 +65,7 @@ struct Calibration {
 
 struct IdentifyReport {
   std::vector<MotionChannel> channels;  ///< channels used
-  /// What the records show; records of another kind are left out.
+  /// Kind of motion of the records; records of another kind are left out.
   identification::MotionKind kind = identification::MotionKind::kNothing;
   std::string advice;  ///< if no modes can be identified: why, and what would help
   std::vector<PartReport> parts;

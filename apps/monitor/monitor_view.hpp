@@ -10,7 +10,7 @@
 
 namespace dashpot::apps {
 
-/// What `dashpot monitor` shows: the last messages, and statistics of all.
+/// Text of `dashpot monitor`: the last messages, and statistics of all.
 class MonitorView {
  public:
   void take(const state_t& message);

@@ -203,7 +203,7 @@ void read_loads(const YamlMapping& scenario, Scene& scene) {
   }
 }
 
-/// What the wall is made of meanwhile.
+/// Reads scenario.tables: the stiffness and damping of the wall from `begin` to `end`.
 void read_tables(const YamlMapping& scenario, Scene& scene) {
   static constexpr std::array<std::string_view, 4> kKeys = {"begin", "end", "stiffness", "damping"};
   sim::ArmOptions& options = scene.arm->options;
