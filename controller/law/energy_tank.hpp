@@ -19,6 +19,7 @@ namespace dashpot::controller {
 ///   twice the delay and a tick costs at most S - reserve - s E; the power of springs likewise.
 /// - What dampers would do if no reference moved acts in full, and what they dissipate returns to
 ///   S, which is at most store + s E.
+/// While no springs act, the brake has its torque, and what it dissipates fills the tank likewise.
 /// Viscous friction of the model counts with b dq^2 / T, which it dissipates at least, and Coulomb
 /// friction with c (|dq| - 0.0028 rad/s T), less than c tanh(v / 0.01 rad/s) dissipates.
 class EnergyTank {
