@@ -79,7 +79,7 @@ void expect_differences(const System<>& system, Random& random, double tolerance
     MatrixXd direction = random.matrix(system.dof(), system.dof());
     if (spectrum.symmetric) direction = (direction + direction.transpose()).eval();
     direction *= system.damping.norm() / direction.norm();
-    const Extended h = 1e-7L;
+    const Extended h = 1e-6L;  // less would show the rounding of ill-conditioned systems
     Coefficients up = extended(system), down = up;
     up.damping += h * direction.cast<Extended>();
     down.damping -= h * direction.cast<Extended>();
@@ -142,7 +142,7 @@ TEST(DampingGradients, AreSmoothThroughCriticalDamping) {
   Random random(7204);
   for (const double distance : {1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 0.0, -1e-10, -1e-7, -1e-3}) {
     SCOPED_TRACE("1 - zeta = " + std::to_string(distance));
-    expect_differences(one_mode_at(random, 1 - distance), random, 3e-7);
+    expect_differences(one_mode_at(random, 1 - distance), random, 1e-7);
   }
 }
 

@@ -85,6 +85,7 @@ void expect_accurate(const MatrixXd& A, double t, double margin = 16) {
   for (const int k : {0, 1}) {
     const MatrixXd reference = reference_phi(k, A, t);
     const double exponential_part = size * growth / std::pow(std::max(1.0, size), k);
+    // Below the smallest normal number there is no relative accuracy.
     const double tolerance = margin * kEps * (reference.cwiseAbs().maxCoeff() + exponential_part) +
                              std::numeric_limits<double>::min();
     EXPECT_TRUE(near(phi(k, A, t), reference, tolerance))
