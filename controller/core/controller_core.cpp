@@ -57,7 +57,7 @@ void ControllerCore::reset(const JointVector& torque) noexcept {
 
 void ControllerCore::release() noexcept {
   faults_.release();
-  tank_.reset();
+  tank_.fill();
   forget_springs();
 }
 
@@ -161,9 +161,8 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
         impedance,          null_space,          generator_.references(),
         generator_.clamp(), setpoints_.wrench(), integral_.on() ? &integral_ : nullptr};
     law_.torque(law, asked_);
-    if (tank_.on() && tank_.limit(law, sensed_.weight, asked_)) {
-      status = worse(status, Status::kTorqueLimited);
-    }
+    short_ = tank_.on() && tank_.limit(law, sensed_.weight, asked_);
+    if (short_) status = worse(status, Status::kTorqueLimited);
     torque = asked_.torque;
     level_ = designed_.level(given);
     // While gains change, dampers that fade keep the margin as well.
@@ -180,7 +179,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
       filter_.apply({sensed_.q, sensed_.qd, sensed_.robot, sensed_.weight, factor},
                     faults_.tip_speed(), aim_, asked_.dampers, torque);
   if (in_force() && integral_.on()) {
-    const bool may_grow = limits == Status::kOk && !asked_.clamped && tank_.share() == 1;
+    const bool may_grow = limits == Status::kOk && !asked_.clamped && !short_;
     if (setpoints_.changes() != integrated_) {
       integral_.fade(setpoints_.steps_left());
     } else if (!hold) {

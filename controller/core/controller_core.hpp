@@ -74,6 +74,7 @@ class ControllerCore {
   // What the last tick left:
   Sensed sensed_;
   Aim aim_ = Aim::kStop;
+  bool short_ = false;  ///< the energy tank weakened the law
   bool given_ = false;  ///< the torque at the start is known
   LawTorque asked_;
   analysis::DampingLevel level_;  ///< of the ratios

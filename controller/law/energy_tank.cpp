@@ -3,28 +3,47 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace dashpot::controller {
+namespace {
+
+constexpr double kTurn = 2 * std::numbers::pi;
+
+}  // namespace
 
 EnergyTank::EnergyTank(const RobotModel& model, const Settings& settings)
     : store_(settings.energy.from == Energy::From::kTank ? settings.energy.store : 0),
       period_(settings.period),
+      lag_(settings.analysis.sampled.cutoff > 0 ? 1 / (kTurn * settings.analysis.sampled.cutoff)
+                                                : 0),
+      passed_(lag_ > 0 ? 1 - std::exp(-period_ / lag_) : 1),
+      on_its_way_((settings.analysis.sampled.delay + 1) * period_ + lag_),
       weakened_(model.dof()),
       delay_(static_cast<std::size_t>(settings.analysis.sampled.delay)),
+      per_rate_(settings.limits.torque_rate.cwiseInverse()),
       viscous_(model.joint_values(&Joint::viscous_friction)),
       coulomb_(model.joint_values(&Joint::coulomb_friction)) {
   reset();
 }
 
 void EnergyTank::reset() noexcept {
-  level_ = store_;
+  fill();
   applied_ = 0;
   known_ = false;
+}
+
+void EnergyTank::fill() noexcept {
+  level_ = store_;
   no_springs();
 }
 
 void EnergyTank::count_work(const JointVector& q, const JointVector& weight, double dt) noexcept {
+  constexpr double kOnTime = 1.5;            // periods
   constexpr double kLostOfCoulomb = 0.0028;  // rad/s: c v tanh(v / 0.01 rad/s) >= c (|v| - this)
+  const double before = level_;
+  const bool on_time = dt <= kOnTime * period_;
+  weight_change_ = known_ && on_time ? difference(weight, weight_) : JointVector::Zero(q.size());
   if (known_ && applied_ > delay_) {
     const JointVector& tau = torques_[(applied_ - 1 - delay_) % torques_.size()];
     for (Eigen::Index i = 0; i < q.size(); ++i) {
@@ -34,6 +53,8 @@ void EnergyTank::count_work(const JointVector& q, const JointVector& weight, dou
       level_ -= (tau[i] - 0.5 * (weight_[i] + weight[i])) * dq - dissipated;
     }
     level_ = std::min(level_, store_ + committed_);
+    // Where states were missing other torques acted meanwhile, so nothing is gained.
+    if (!on_time) level_ = std::min(level_, before);
   }
   known_ = true;
   q_ = q;
@@ -51,8 +72,10 @@ JointVector torque_against(const ImpedanceLaw::Input& law) noexcept {
   if (impedance.task_weight > 0) {
     const Matrix6 C = impedance.base.damping + turned(impedance.tool.damping, robot.R_BT);
     add_torque(robot.J, C * twist(robot.J, back), result);
-    if (impedance.null_space()) add(null_space.damper(impedance.null_damping, back), result);
-    if (impedance.null_damping_ratio > 0) add(null_space.ratio_damper(back), result);
+    if (impedance.null_space()) {
+      add(null_space.damper(impedance.null_damping, back), result);
+      if (impedance.null_damping_ratio > 0) add(null_space.ratio_damper(back), result);
+    }
   }
   return result;
 }
@@ -81,8 +104,11 @@ bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight
       }
     }
   }
-  const double there = std::max(0.0, level_ - kReserve * store_);
-  share_ = std::min(energy > there ? there / energy : 1, affordable(product(pull, law.qd), there));
+  energy = std::max(0.0, energy);  // of a K that couples what the error clamp shortens apart
+  mass_.compute(law.robot.M, 1e-14 * law.robot.M.trace());
+  const double lasting = applied_ > 0 ? under_way(difference(put_out_, weight), law.qd) : 0;
+  const double there = std::max(0.0, level_ - kReserve * store_ - lasting);
+  share_ = std::min(energy > there ? there / energy : 1, affordable(pull, law.qd, there));
   committed_ = share_ * energy;
   if (share_ < 1) {
     weakened_ = impedance;
@@ -91,22 +117,42 @@ bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight
     weakened_.tool.stiffness *= share_;
     weakened_.null_stiffness *= share_;
   }
-  JointVector further = difference(asked.torque, torque_against(law));
+  const JointVector against = torque_against(law), moving = difference(asked.dampers, against);
+  JointVector further = difference(asked.torque, against);
   add(pull, further, -1);
   add(weight, further, -1);
-  const double fed = affordable(product(further, law.qd), there - committed_);
+  const double fed = affordable(further, law.qd, there - committed_);
   add(pull, asked.torque, share_ - 1);
   add(further, asked.torque, fed - 1);
+  add(moving, asked.dampers, fed - 1);
+  // The weight that the torque will meet: one that comes late feeds a moving arm.
+  add(weight_change_, asked.torque, on_its_way_ / period_ - 0.5);
+  asked.tip_wrench += (share_ - 1) * asked.tip_pull;
   return share_ < 1 || fed < 1;
 }
 
-double EnergyTank::affordable(double power, double energy) const noexcept {
-  const double spent = 2 * (static_cast<double>(delay_) + 1) * period_ * power;
-  return spent > energy ? std::max(0.0, energy / spent) : 1;
+double EnergyTank::affordable(const JointVector& torque, const JointVector& qd,
+                              double energy) const noexcept {
+  const double spent = under_way(torque, qd);
+  return spent > energy ? energy / spent : 1;
+}
+
+double EnergyTank::under_way(const JointVector& torque, const JointVector& qd) const noexcept {
+  JointVector momentum = torque;
+  double energy = 0;
+  for (Eigen::Index i = 0; i < torque.size(); ++i) {
+    momentum[i] *= on_its_way_ + 0.5 * std::abs(torque[i]) * per_rate_[i];
+    energy += std::abs(momentum[i] * qd[i]);
+  }
+  mass_.solve_L(momentum.data());
+  return energy + 0.5 * momentum.squaredNorm();
 }
 
 void EnergyTank::apply(const JointVector& torque) noexcept {
-  torques_[applied_++ % torques_.size()] = torque;
+  if (applied_ == 0) acting_ = torque;
+  put_out_ = torque;
+  add(difference(torque, acting_), acting_, passed_);
+  torques_[applied_++ % torques_.size()] = acting_;
 }
 
 }  // namespace dashpot::controller

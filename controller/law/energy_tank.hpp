@@ -13,10 +13,12 @@ namespace dashpot::controller {
 /// where dU = 1/2 (g_k + g_k+1)' dq is the change of the potential energy whose torque the
 /// controller compensates. E is the energy of the springs as they are stretched now,
 ///     E = 1/2 (e_q' K_q e_q + e' K_C e + e_0' K_0 e_0).
-/// - Springs act with the share s = min(1, (S - reserve) / E) of their torque: they cannot release
-///   more than there is. Gains that grow and references that move away so wait for energy.
-/// - Feed-forward, and what dampers add because references move, shrinks such that its power for
-///   twice the delay and a tick costs at most S - reserve - s E; the power of springs likewise.
+/// What the last torque spends until it can be gone is never available: R = S - reserve - that.
+/// - Springs act with the share s = min(1, R / E) of their torque: they cannot release more than
+///   there is. Gains that grow and references that move away so wait for energy.
+/// - Springs spend at most R until they can be gone; feed-forward, and what dampers add because
+///   references move, at most R - s E.
+/// - The weight is extrapolated to the middle of the time in which the torque acts.
 /// - What dampers would do if no reference moved acts in full, and what they dissipate returns to
 ///   S, which is at most store + s E.
 /// While no springs act, the brake has its torque, and what it dissipates fills the tank likewise.
@@ -29,6 +31,8 @@ class EnergyTank {
   bool on() const noexcept { return store_ > 0; }
   /// Fills the tank, and forgets the torques.
   void reset() noexcept;
+  /// Fills the tank; the torques under way still count.
+  void fill() noexcept;
   /// Counts the work since the last tick. `weight`: the gravity torque that is compensated, n.
   void count_work(const JointVector& q, const JointVector& weight, double dt) noexcept;
   /// Scales a torque of the law, in place. True if that changed it.
@@ -50,18 +54,24 @@ class EnergyTank {
  private:
   static constexpr std::size_t kMostDelay = 20;  // ticks, as analysis.sampled.delay
 
-  /// Returns the share of a power, W, with which the torques under way spend at most `energy`, J,
-  /// even if the joints get twice as fast.
-  double affordable(double power, double energy) const noexcept;
+  /// Returns the energy that a torque spends, J, until delay, low-pass and the limit of its rate
+  /// let it go: |qd_i p_i| for every joint and 1/2 p' M^-1 p, with p_i = tau_i (delay + lag +
+  /// |tau_i| / (2 rate_i)), in whatever direction contacts turn the joints.
+  double under_way(const JointVector& torque, const JointVector& qd) const noexcept;
+  /// Returns the share of a torque that spends at most `energy` so.
+  double affordable(const JointVector& torque, const JointVector& qd, double energy) const noexcept;
 
-  double store_;  ///< J; 0: there is no tank
-  double period_;
+  double store_;                  ///< J; 0: there is no tank
+  double period_, lag_, passed_;  ///< s; of the drives' low-pass: s, share that passes in a tick
+  double on_its_way_;             ///< s: a torque acts in full, and is gone, after that
   double level_ = 0, committed_ = 0, share_ = 1;
   Impedance weakened_;
   std::size_t delay_, applied_ = 0;  ///< ticks; torques that were put out
   bool known_ = false;               ///< q_ and weight_
+  JointVector per_rate_;             ///< s/(N m)
   JointVector viscous_, coulomb_;
-  JointVector q_, weight_;
+  JointVector q_, weight_, acting_, put_out_, weight_change_;
+  SmallCholesky mass_;
   std::array<JointVector, kMostDelay + 1> torques_;
 };
 

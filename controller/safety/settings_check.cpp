@@ -316,6 +316,12 @@ void validate(const Settings& settings, const RobotModel& model) {
              " s late (analysis.sampled) needs " + text::number(stopping) +
              " s: set that, or less delay and a higher cutoff");
   }
+  if (settings.energy.from == Energy::From::kTank && model.elastic_joints() > 0 &&
+      model.position_sensor() == PositionSensor::kLink) {
+    throw InvalidSettings("control.energy",
+                          "tank: needs the positions of motors, whose work it "
+                          "counts; robot.position_sensor is link");
+  }
   check_initial(settings.initial, n);
 }
 

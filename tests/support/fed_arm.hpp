@@ -45,7 +45,8 @@ struct FedArm {
     s.limits.gain_margin = 1;
     s.limits.velocity.setConstant(50);
     s.limits.tip_velocity = 50;
-    s.limits.torque_rate.setConstant(1e6);
+    s.limits.torque_rate.setConstant(random.log_uniform(500, 1e5));
+    s.analysis.sampled.cutoff = random.integer(0, 2) == 0 ? random.log_uniform(20, 300) : 0;
     s.limits.torque.setConstant(1e3);
     s.limits.position_lower.setConstant(-100);
     s.limits.position_upper.setConstant(100);
@@ -83,6 +84,7 @@ struct FedArm {
     sim::Arm body(twin->robot, world);
     sim::PlantOptions options;
     options.delay = settings.analysis.sampled.delay;
+    options.torque_cutoff = settings.analysis.sampled.cutoff;
     options.integrator.method = sim::Method::kRosenbrock;
     options.initial_torque = weight();
     sim::Plant plant(body, options, start);
@@ -95,10 +97,11 @@ struct FedArm {
                  audit.viscous_heat - audit.friction_heat;
         });
   }
-  /// Without friction, whose heat MuJoCo does not report, and without delay.
+  /// Without friction, whose heat MuJoCo does not report, delay and low-pass.
   Fed in_mujoco(bool tank) {
     twin.emplace(arm, false);
     settings.analysis.sampled.delay = 0;
+    settings.analysis.sampled.cutoff = 0;
     world.coulomb_friction = false;
     const auto body = MujocoArm::make(twin->robot, world, {}, start);
     double work = 0;
