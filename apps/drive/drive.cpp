@@ -10,6 +10,7 @@
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/lcmtypes/sink.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
@@ -77,7 +78,7 @@ class Inbox {
   DriveSession& session_;
 };
 
-/// Follows the goals of a scenario until a fault.
+/// Follows the goals of a scenario until a fault, or until the robot stops by itself.
 class GoalFollower {
  public:
   /// Both must outlive it.
@@ -95,9 +96,23 @@ class GoalFollower {
     next_ = 1;
   }
 
+  /// Throws InputError unless the arm stands where the scenario starts: no simulation has shown
+  /// another way to the first goal.
+  void check_start(const JointVector& q) const {
+    constexpr double kNear = 0.1;  // rad (m)
+    if (steps_.empty() || q.size() != steps_[0].setpoint.joint_position.size()) return;
+    for (Eigen::Index j = 0; j < q.size(); ++j) {
+      const double start = steps_[0].setpoint.joint_position[j];
+      if (!(std::abs(q[j] - start) > kNear)) continue;
+      throw InputError("scenario.start.position",
+                       "joint " + std::to_string(j + 1) + " starts at " + text::number(start, 4) +
+                           " rad (m), the arm is at " + text::number(q[j], 4) +
+                           ": move it there first");
+    }
+  }
   /// Goes to the goal of `time`, s since the arm is held. The gains of steps do not count.
-  void follow(double time) noexcept {
-    if (journal_.record.faults > 0) next_ = steps_.size();
+  void follow(double time, bool interrupted) noexcept {
+    if (interrupted || journal_.record.faults > 0) next_ = steps_.size();
     for (; next_ < steps_.size() && time >= steps_[next_].at; ++next_) {
       goal_.hold(steps_[next_].setpoint);
     }
@@ -125,7 +140,8 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     return std::chrono::duration<double>(Clock::now() - then).count();  // s
   };
   Clock::time_point heard = Clock::now(), began, asked;
-  std::string why;  // it ends
+  std::int64_t stopped = 0;  // statuses of a robot that stopped by itself, before the start
+  std::string why;           // it ends
   bool told = false;
   while (!session.ended()) {
     if (why.empty() && StopSignal::given()) why = "ended by the user";
@@ -162,7 +178,12 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     const bool ran = session.running();
     const lcmtypes::DriverStatus status = std::move(*inbox.newest);
     inbox.newest.reset();
-    if (session.running()) goals.follow(since(began));
+    if (session.running()) {
+      goals.follow(since(began), session.record.stopped > stopped);
+    } else {
+      goals.check_start(status.position);
+      stopped = session.record.stopped;
+    }
     const bool answers = session.take(status, inbox.arrived, now, command);
     if (!ran && session.running()) {
       began = Clock::now();

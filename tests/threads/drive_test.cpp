@@ -152,6 +152,42 @@ TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
   hold_and_move();
 }
 
+/// Goals of a scenario, but only from where it starts.
+TEST_P(Drive, GoesToTheGoalsOfAScenario) {
+  const Scratch scratch;
+  const bool iiwa = arm.kind == DriverKind::kIiwa;
+  const std::string begin =
+      iiwa ? "0, 30 deg, 0, -80 deg, 0, 60 deg, 0" : "0, -45 deg, 0, -135 deg, 0, 90 deg, 45 deg";
+  const auto with = [&](const std::string& start) {
+    const std::string scenario = "scenario: {duration: 4, start: {position: [" + start +
+                                 "]}, steps: [{at: 0.5, joint_position: [0.1" +
+                                 begin.substr(begin.find(',')) + "]}]}\n";
+    return changed_configuration(
+        scratch, arm, {{"analysis:", scenario + "watchdog: {longest_gap: 200 ms}\nanalysis:"}});
+  };
+  Listener listener(url);
+  Running fake(driver());
+  const std::string log = scratch.path("drive.lcm");
+  {
+    Running driving(drive(with("0.3" + begin.substr(begin.find(','))), {"--scenario"}));
+    EXPECT_EQ(driving.finish(), 2);
+    if (driving.complaints().find("no status") != std::string::npos) {
+      GTEST_SKIP() << kNoMulticast;
+    }
+    EXPECT_THAT(driving.complaints(), HasSubstr("scenario.start.position: joint 1 starts at 0.3"));
+  }
+  Running driving(drive(with(begin), {"--scenario", "--log", log}));
+  const Json result = summary_of(driving);
+  fake.send(SIGTERM);
+  const std::vector<state_t> states = states_of(log);
+  if (lost_pace(states)) GTEST_SKIP() << kNoPace;
+  EXPECT_EQ(result["ended"], "ended after its time");
+  ASSERT_FALSE(states.empty());
+  double goal = 0;
+  for (const state_t& state : states) goal = std::max(goal, state.reference_joint_position[0]);
+  EXPECT_NEAR(goal, 0.1, 1e-9);
+}
+
 /// SIGTERM reaches an arm on its way: its torque fades where it stands.
 TEST_P(Drive, StopsTheArmBeforeTheTorqueFades) {
   const Scratch scratch;
