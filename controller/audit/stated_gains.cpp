@@ -96,6 +96,7 @@ AuditOptions audit_options(const Settings& settings) {
   }
   options.margin = settings.limits.gain_margin;
   options.null_projector = settings.null_projector;
+  options.null_weights = settings.null_weights;
   options.lower = settings.limits.position_lower;
   options.upper = settings.limits.position_upper;
   options.settings = settings;

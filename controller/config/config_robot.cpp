@@ -70,7 +70,8 @@ void read_joint_option(const text::YamlMapping& robot, std::string_view key,
 void read_gears(const text::YamlMapping& keys, const RobotModel& model, ModelOptions& options) {
   read_joint_option(keys, "torque_loop_inertia_ratio", joint_units(model, "", ""),
                     options.torque_loop_inertia_ratio, text::Range{0, false, 1});
-  if (options.torque_loop_inertia_ratio.size() > 0 && options.reflected_inertia.size() == 0) {
+  if (options.torque_loop_inertia_ratio.size() > 0 && options.reflected_inertia.size() == 0 &&
+      model.joint_values(&Joint::reflected_inertia).isZero(0)) {
     throw keys.error("torque_loop_inertia_ratio", "needs reflected_inertia, kg m^2, or drives");
   }
   read_joint_option(keys, "gear_stiffness", joint_units(model, "N m/rad", "N/m"),
