@@ -52,11 +52,11 @@ PairFunction exponential(const Pair& z) {
 }
 
 /// Horner's rule with numbers a + b N, N^2 = d.
-PairFunction taylor(int k, const Pair& z) {
-  double coefficient = reciprocal_factorial(k + kTerms);
+PairFunction taylor(const Pair& z) {
+  double coefficient = reciprocal_factorial(1 + kTerms);
   PairFunction sum{coefficient, 0};
   for (int j = kTerms - 1; j >= 0; --j) {
-    coefficient *= k + j + 1;
+    coefficient *= j + 2;
     sum = {coefficient + sum.mean * z.x + sum.slope * z.d, sum.mean + sum.slope * z.x};
   }
   return sum;
@@ -65,12 +65,12 @@ PairFunction taylor(int k, const Pair& z) {
 PairFunction pair_function(int k, const Pair& z) {
   if (k == 0) return exponential(z);
   const double size = std::max(std::abs(z.first), std::abs(z.second));
-  if (size < 1) return taylor(k, z);
+  if (size < 1) return taylor(z);
 
   const Complex gap = z.first - z.second;
   if (std::abs(gap) > 0.2 * size) {
-    const Complex first = phi(k, z.first);
-    const Complex second = phi(k, z.second);
+    const Complex first = phi(1, z.first);
+    const Complex second = phi(1, z.second);
     return {0.5 * (first + second).real(), ((first - second) / gap).real()};
   }
   // phi_1 = Z^-1 (phi_0 - I), with Z^-1 = (x - N) / (x^2 - d): well conditioned here.

@@ -193,7 +193,8 @@ double first_boundary(const TouchedLoop& loop, Trial inside, const Trial& outsid
 /// Returns the next stiffness that is tried: 1.6 times the last one, or less where that takes the
 /// touch further than a turn of `kMostTurn` rad a tick.
 double next_stiffness(const TouchedLoop& loop, double last, double first) {
-  constexpr double kMostTurn = 0.5, kRatio = 1.26;  // of the frequency of the touch
+  constexpr double kMostTurn = 0.5;  // rad
+  constexpr double kRatio = 1.26;    // factor on the frequency of the touch
   if (last < first) return first;
   const double turn = std::sqrt(last / loop.stiffness_at(1 / loop.period()));
   const double next = std::min(kRatio * turn, turn + kMostTurn);
@@ -229,13 +230,15 @@ void find_limit(const TouchedLoop& loop, const Touch& touch, ContactLimit& resul
     const double turns = loop.half_turns(here.factor);
     if (turns > loop.half_turns(before[0].factor) && here.values.size() > 0) {
       const auto [low, found] = look_at_axis(loop, std::numbers::pi * turns);
-      if (low.excess < 0 && !(found.excess < 0)) {
+      const bool sooner = here.excess < 0 || found.factor < here.factor;
+      if (low.excess < 0 && !(found.excess < 0) && sooner) {
         before[0] = low;
         here = found;
       }
     }
     if (!(here.excess < 0)) {
       result.stiffness = first_boundary(loop, before[0], here);
+      if (result.stiffness > touch.most) result.stiffness = kInfinity;
       return;
     }
     before = {here, before[0]};
