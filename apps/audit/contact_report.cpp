@@ -77,7 +77,9 @@ std::string verdict(const AuditTask& task, const ContactReport& report) {
         known ? "Unstable before it touches anything"
               : "Unstable before it touches anything, as an arm without rotors, which yours is not";
   } else if (std::isinf(touch.limit.stiffness)) {
-    text = "Stable in contact with springs of any stiffness up to 1e9 N/m " +
+    const double most = report.options.most;
+    text = "Stable in contact with springs of any stiffness up to " +
+           (most > 1e9 ? format_number(most, 4) : "1e9") + " N/m " +
            (report.options.direction ? "along " + direction_text(touch.direction)
                                      : std::string("in any direction"));
   } else {

@@ -194,16 +194,19 @@ void add_command(CLI::App* command, bool calibrates) {
                                       ": end the name with .urdf, or name the MuJoCo model of the "
                                       "arm with --mjcf");
     }
+    if (!options->calibrates && is_model_file(options->write)) {
+      throw InputError("--write", "robot descriptions are written by dashpot calibrate");
+    }
     const bool to_model = options->calibrates && is_model_file(options->write);
     check_outputs({{"--write", options->write}}, {{"the robot description", config.robot.urdf}});
     CheckModelReport report = check_files(*options, config);
+    if (!options->suggest.empty()) {
+      suggest_motion(options->config, options->suggest, config, report);
+    }
     if (to_model) {
       write_model(options->write, options->mjcf, config, report);
     } else if (!options->write.empty()) {
       write_config(options->config, options->write, config, report);
-    }
-    if (!options->suggest.empty()) {
-      suggest_motion(options->config, options->suggest, config, report);
     }
     if (!options->write_drives.empty()) write_drives(options->write_drives, config, report);
     print(options->json ? json_text(check_model_json(report)) : check_model_table(report));

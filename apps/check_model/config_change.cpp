@@ -134,4 +134,10 @@ std::string changed_config(const std::string& text, const std::vector<ConfigChan
   return std::string(emitter.c_str()) + "\n";
 }
 
+std::string yaml_list(const Eigen::VectorXd& values) {
+  std::string list;
+  for (const double value : values) list += (list.empty() ? "" : ", ") + text::number(value, 5);
+  return "[" + list + "]";
+}
+
 }  // namespace dashpot::apps

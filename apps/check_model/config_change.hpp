@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,9 @@ struct ConfigChange {
   std::vector<std::string> path;
   std::string value;
 };
+
+/// Returns "[a, b, ...]" with five digits.
+std::string yaml_list(const Eigen::VectorXd& values);
 
 /// Returns the text of a YAML mapping with some keys changed or added, and everything else,
 /// including comments, as it was. If the text cannot be changed so (anchors, block sequences), it

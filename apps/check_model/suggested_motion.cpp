@@ -7,6 +7,7 @@
 #include <dashpot/apps/loop/simulated_loop.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/text/printable.hpp>
+#include <dashpot/text/read_file.hpp>
 
 #include <algorithm>
 #include <array>
@@ -34,11 +35,17 @@ constexpr std::array kPaces = {Pace{0.1, 0.25, 30},  Pace{0.2, 0.25, 30},  Pace{
 constexpr double kEvery = 1.5;     // s from goal to goal
 constexpr double kLimited = 0.02;  // share of the time in which limits of torque or speed may act
 
-std::string list_of(const JointVector& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + text::number(value, 4);
-  return "[" + text + "]";
-}
+/// A file beside the result, for the scenes that are tried; goes in the end.
+struct TrialFile {
+  explicit TrialFile(const std::string& result) : path(result + ".trial") {}
+  TrialFile(const TrialFile&) = delete;
+  TrialFile& operator=(const TrialFile&) = delete;
+  ~TrialFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+  }
+  const std::string path;
+};
 
 /// Where goals may be: the middle and half the range of each joint.
 std::pair<JointVector, JointVector> ranges(const Config& config, const CheckModelReport& report) {
@@ -74,15 +81,15 @@ std::string with_goals(const std::string& text, std::vector<ConfigChange> change
     JointVector goal = middle;
     for (Index j = 0; j < goal.size(); ++j) goal[j] += half[j] * (2 * uniform() - 1);
     steps += (steps.empty() ? "" : ",") + std::string("\n    {at: ") + text::number(at) +
-             ", joint_position: " + list_of(goal) + "}";
+             ", joint_position: " + yaml_list(goal) + "}";
   }
   const JointVector velocity = pace.velocity * config.settings.limits.velocity;
   changes.push_back({{"control", "mode"}, "joint"});
-  changes.push_back({{"motion", "velocity"}, list_of(velocity)});
-  changes.push_back({{"motion", "acceleration"}, list_of(velocity / pace.rise)});
+  changes.push_back({{"motion", "velocity"}, yaml_list(velocity)});
+  changes.push_back({{"motion", "acceleration"}, yaml_list(velocity / pace.rise)});
   changes.push_back({{"scenario"},
-                     "{duration: " + text::number(pace.duration) +
-                         ", start: {position: " + list_of(middle) + "}, steps: [" + steps + "]}"});
+                     "{duration: " + text::number(pace.duration) + ", start: {position: " +
+                         yaml_list(middle) + "}, steps: [" + steps + "]}"});
   return changed_config(text, changes, kept);
 }
 
@@ -92,8 +99,7 @@ std::optional<TorqueRecord> simulate(const std::string& path, const Config& conf
                                      const CheckModelReport& report) {
   Scene scene = load_scene(path);
   controller::RobotDescription robot = calibrated_robot(config, report.check);
-  sim::RobotParameters parameters;
-  parameters.reflected_inertia = robot.options.reflected_inertia;
+  sim::RobotParameters parameters = believed(robot, robot.model());
   for (Index j = 0; j < parameters.reflected_inertia.size(); ++j) {
     const identification::Estimate& one =
         report.check.joints[static_cast<std::size_t>(j)].reflected_inertia;
@@ -103,13 +109,7 @@ std::optional<TorqueRecord> simulate(const std::string& path, const Config& conf
       inertia = std::max(one.value, one.deviation);
     }
   }
-  parameters.viscous_friction = robot.options.viscous_friction;
-  parameters.coulomb_friction = robot.options.coulomb_friction;
-  parameters.gravity = robot.options.gravity;
   if (!config.settings.feed_forward.gravity) parameters.gravity.setZero();  // the robot holds it
-  parameters.accept_inertias = true;
-  const controller::Payload& payload = robot.options.payload;
-  parameters.payload = {payload.mass, payload.center, payload.inertia};
   scene.arm->robot = sim::Robot::from_file(robot.urdf, robot.base, robot.tip, parameters);
   scene.plant.delay = std::max(scene.plant.delay, report.loop.delay);
   const auto controller = PluginLibrary("").create(path, scene.dof());
@@ -175,23 +175,24 @@ void suggest_motion(const std::string& from, const std::string& to, const Config
   std::string best;
   std::vector<std::string> left;
   bool kept = true;
+  const TrialFile trial(to);
   for (const Pace& pace : kPaces) {
     show_progress(static_cast<double>(&pace - kPaces.data()) / kPaces.size(), "trying a motion");
     const std::string scene =
         with_goals(text, path_changes(from, to, config), config, report, pace, kept);
-    write_text("--suggest-motion", to, scene);
-    const auto record = simulate(to, config, report);
+    write_text("--suggest-motion", trial.path, scene);
+    const auto record = simulate(trial.path, config, report);
     if (!record) break;
     const ModelCheck check = identification::check_model(
-        config.robot, {*record}, {report.check.validation > 0 ? 0.2 : 0.0, report.payload_known});
+        config.robot, {*record},
+        {report.check.validation / report.check.used, report.payload_known});
     std::vector<std::string> there = undetermined(check);
-    if (!best.empty() && there.size() > left.size()) continue;
+    if (!best.empty() && there.size() >= left.size()) continue;
     best = scene;
     left = std::move(there);
     if (left.empty()) break;
   }
   if (best.empty()) {
-    std::filesystem::remove(to);
     throw InputError("--suggest-motion",
                      "with the gains and limits of the configuration, limits act even in slow "
                      "motion");

@@ -44,16 +44,6 @@ FigurePlace place_of(ArmFigure figure) {
           &CheckModelReport::torque_unit};
 }
 
-std::string yaml_list(const Eigen::VectorXd& values) {
-  std::string text;
-  for (const double value : values) {
-    char number[40];
-    std::snprintf(number, sizeof number, "%.5g", value);
-    text += (text.empty() ? "" : ", ") + std::string(number);
-  }
-  return "[" + text + "]";
-}
-
 constexpr double kShown = 3;    // deviations: a rotor of less may be noise
 constexpr double kRefutes = 4;  // deviations from what the configuration says
 
@@ -98,6 +88,14 @@ std::vector<ConfigChange> changes_for(const std::string& from_file, const std::s
   return changes;
 }
 
+std::string kept_rotor(std::size_t j, const Joint& joint, const Estimate& found) {
+  const std::string unit = joint.type == controller::JointType::kPrismatic ? " kg" : " kg m^2";
+  return "joint " + std::to_string(j + 1) + ": its reflected inertia stays " +
+         text::number(joint.reflected_inertia, 3) + unit + " though the records show none (" +
+         text::number(found.value, 2) + " +- " + text::number(found.deviation, 2) + unit +
+         "), as torque sensors behind the gear do; if yours are on the motor's side, write 0";
+}
+
 }  // namespace
 
 std::optional<double> found_figure(const Config& config, const ModelCheck& check, ArmFigure figure,
@@ -115,14 +113,6 @@ JointVector determined(const Config& config, const ModelCheck& check, ArmFigure 
     value = found_figure(config, check, figure, j).value_or(value);
   }
   return result;
-}
-
-std::string kept_rotor(std::size_t j, const Joint& joint, const Estimate& found) {
-  const std::string unit = joint.type == controller::JointType::kPrismatic ? " kg" : " kg m^2";
-  return "joint " + std::to_string(j + 1) + ": its reflected inertia stays " +
-         text::number(joint.reflected_inertia, 3) + unit + " though the records show none (" +
-         text::number(found.value, 2) + " +- " + text::number(found.deviation, 2) + unit +
-         "), as torque sensors behind the gear do; if yours are on the motor's side, write 0";
 }
 
 std::vector<std::string> kept_rotors(const Config& config, const CheckModelReport& report) {

@@ -162,7 +162,11 @@ SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
   controller::AuditOptions stated;
   take_null_space(options, model, stated);
   const controller::Gains& gains = stated.gains;
-  if (stiffness && gains.null_stiffness.size() + gains.null_damping.size() > 0) {
+  const bool null_space = gains.null_stiffness.size() + gains.null_damping.size() > 0;
+  if (null_space && joint_springs) {
+    throw InputError("--joint-stiffness", "does not go with --null-stiffness and --null-damping");
+  }
+  if (null_space) {
     stated.gains.task_stiffness = stiffness->asDiagonal();
     const analysis::TaskImpedance all = controller::Audit(model, stated).impedance(q);
     entry.impedance.stiffness = all.stiffness;

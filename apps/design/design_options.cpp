@@ -138,12 +138,12 @@ void check(const DesignOptions& options) {
       options.region ? "does not go with --region" : "does not go with --contact";
   if (options.near && many) throw InputError("--near", not_with);
   if (options.largest_ratio && !many) {
-    throw InputError("--largest-ratio", "needs --region");
+    throw InputError("--largest-ratio", "needs --region or --contact");
   }
   if (options.largest_ratio && *options.largest_ratio < options.ratio) {
     throw InputError("--largest-ratio", "is below --damping-ratio");
   }
-  if (!options.csv.empty() && !many) throw InputError("--csv", "needs --region");
+  if (!options.csv.empty() && !many) throw InputError("--csv", "needs --region or --contact");
   if (options.timing.period == 0 && (given(options.timing) || options.margin != 2)) {
     throw InputError("--period",
                      "missing; --delay, --cutoff, --integral-time and --margin need it");

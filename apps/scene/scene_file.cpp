@@ -16,22 +16,6 @@ using text::Units;
 using text::YamlMapping;
 using text::YamlNode;
 
-/// Returns the controller's parameters of the robot; `simulation.robot` may change them for the
-/// simulation.
-sim::RobotParameters believed(const controller::Config& config) {
-  const controller::ModelOptions& options = config.robot.options;
-  sim::RobotParameters parameters;
-  parameters.reflected_inertia = config.model.joint_values(&Joint::reflected_inertia);
-  parameters.viscous_friction = config.model.joint_values(&Joint::viscous_friction);
-  parameters.coulomb_friction = config.model.joint_values(&Joint::coulomb_friction);
-  parameters.gear_stiffness = config.model.joint_values(&Joint::gear_stiffness);
-  parameters.gear_damping = config.model.joint_values(&Joint::gear_damping);
-  parameters.gravity = options.gravity;
-  parameters.accept_inertias = true;  // the controller's model has judged them
-  parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};
-  return parameters;
-}
-
 lcmtypes::CommandLimits command_limits(const YamlMapping& root, const controller::Config& config) {
   lcmtypes::CommandLimits limits;
   limits.position_lower = config.settings.limits.position_lower;
@@ -54,7 +38,7 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
   controller::Config config = controller::read_config(document, directory);
   const controller::RobotDescription robot = config.robot;
   const Units positions = controller::joint_units(config.model, "rad", "m");
-  ArmSimulation simulation{believed(config), {}, directory};
+  ArmSimulation simulation{believed(config.robot, config.model), {}, directory};
   if (config.model.position_sensor() == controller::PositionSensor::kLink) {
     simulation.options.position_sensor = sim::PositionSensor::kLink;
   }
@@ -123,6 +107,21 @@ void check(const Scene& scene) try {
 }
 
 }  // namespace
+
+sim::RobotParameters believed(const controller::RobotDescription& robot,
+                              const controller::RobotModel& model) {
+  const controller::ModelOptions& options = robot.options;
+  sim::RobotParameters parameters;
+  parameters.reflected_inertia = model.joint_values(&Joint::reflected_inertia);
+  parameters.viscous_friction = model.joint_values(&Joint::viscous_friction);
+  parameters.coulomb_friction = model.joint_values(&Joint::coulomb_friction);
+  parameters.gear_stiffness = model.joint_values(&Joint::gear_stiffness);
+  parameters.gear_damping = model.joint_values(&Joint::gear_damping);
+  parameters.gravity = options.gravity;
+  parameters.accept_inertias = true;  // the controller's model has judged them
+  parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};
+  return parameters;
+}
 
 Scene load_scene(const std::string& path) try {
   Scene scene;

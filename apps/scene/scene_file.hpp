@@ -12,6 +12,10 @@ namespace dashpot::apps {
 /// sim/scenes has examples with all keys. Throws InputError.
 Scene load_scene(const std::string& path);
 
+/// Returns the parameters of a simulation of the robot that a controller knows.
+sim::RobotParameters believed(const controller::RobotDescription& robot,
+                              const controller::RobotModel& model);
+
 /// A configuration of the controller, and the limits of commands over a bus: all that a loop with a
 /// robot needs.
 struct CommandedConfig {
