@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/robot_description.hpp>
 #include <dashpot/identification/torque_record.hpp>
 
@@ -72,14 +73,19 @@ struct ModelCheck {
   int parameters = 0, rank = 0;
   double condition = 0;
   /// For offset, Coulomb and viscous friction of each joint (3 n), the payload's mass, first moment
-  /// (3) and inertia (6) about the tip link's origin, reflected inertias (n) and the delay.
+  /// (3) and inertia (6: xx, yy, zz, xy, xz, yz) about the tip link's origin, reflected inertias (n)
+  /// and the delay.
   Eigen::MatrixXd covariance;
+  controller::Attachment attachment;  ///< the description's, with the payload that was found
 };
 
 struct ModelCheckOptions {
   double validation = 0;       ///< share of each record, at its end, that is kept for validation
   bool payload_known = false;  ///< the arm carries the description's payload
 };
+
+/// Adds to parameter i of a body, 0 to 9 in the order of ModelCheck::covariance.
+void add_to_body(controller::Attachment& body, Eigen::Index i, double amount);
 
 /// Compares the torques of records with the model, and fits offset, Coulomb and viscous friction
 /// and reflected inertia of each joint, a payload, and a delay of the torques. Accelerations are

@@ -110,8 +110,12 @@ std::string modes_text(const CheckModelReport& report) {
       table.add_row({"none in the sampled loop", "-"});
       continue;
     }
-    table.add_row({estimate_text({mode.natural_frequency, mode.natural_frequency_std, true}),
-                   estimate_text({mode.damping_ratio, mode.damping_ratio_std, true})});
+    const auto text_of = [](double value, double deviation) {
+      constexpr double kKnown = 0.05;  // of the value, with 95 %
+      return estimate_text({value, deviation, 1.96 * deviation < kKnown * std::abs(value)});
+    };
+    table.add_row({text_of(mode.natural_frequency, mode.natural_frequency_std),
+                   text_of(mode.damping_ratio, mode.damping_ratio_std)});
   }
   std::string text = "\nModes of the calibrated loop, at q =";
   for (const double q : report.rest) text += " " + format_number(q, 3);
@@ -252,9 +256,9 @@ Json check_model_json(const CheckModelReport& report) {
   Json modes = Json::array();
   for (const CalibratedMode& mode : report.loop.modes) {
     modes.push_back({{"natural_frequency", mode.natural_frequency},
-                     {"natural_frequency_std", mode.natural_frequency_std},
+                     {"natural_frequency_std", number(mode.natural_frequency_std)},
                      {"damping_ratio", mode.damping_ratio},
-                     {"damping_ratio_std", mode.damping_ratio_std}});
+                     {"damping_ratio_std", number(mode.damping_ratio_std)}});
   }
   Json result = {
       {"torques", kind_text(check.kind)},

@@ -1,4 +1,5 @@
 #include <dashpot/apps/check_model/config_change.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <yaml-cpp/yaml.h>
 #include <algorithm>

@@ -1,4 +1,5 @@
 #include <dashpot/identification/check_model/findings.hpp>
+#include <dashpot/identification/check_model/hypotheses.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <cmath>
@@ -180,6 +181,10 @@ void report(const TorqueFit& fit, ModelCheck& check) {
   report_payload(fit, check.payload);
   report_delay(fit, check.delay);
   const Index always = fit.rest_of_delay() + 1;
+  check.attachment = fit.model.attachment();
+  for (Index i = 0; i < kPayloadColumns && !fit.unseen(fit.payload()); ++i) {
+    add_to_body(check.attachment, i, fit.result.value[fit.payload() + i]);
+  }
   check.covariance = fit.result.covariance.topLeftCorner(always, always);
   if (check.order.empty()) report_suspicions(fit, check);
   report_ambiguities(fit, check);

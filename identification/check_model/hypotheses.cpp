@@ -44,24 +44,29 @@ controller::Attachment body_of(const KDL::RigidBodyInertia& body) {
 
 }  // namespace
 
-std::vector<MatrixXd> body_columns(const controller::RobotModel& model, const WeakForm& form,
-                                   std::size_t count) {
+void add_to_body(controller::Attachment& body, Index i, double amount) {
   constexpr std::array<std::array<int, 2>, 6> kEntries{
       {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+  if (i == 0) {
+    body.mass += amount;
+  } else if (i < 4) {
+    body.first_moment[i - 1] += amount;
+  } else {
+    const auto [row, col] = kEntries[static_cast<std::size_t>(i - 4)];
+    body.inertia(row, col) += amount;
+    if (row != col) body.inertia(col, row) += amount;
+  }
+}
+
+std::vector<MatrixXd> body_columns(const controller::RobotModel& model, const WeakForm& form,
+                                   std::size_t count) {
   controller::DynamicsKernel kernel(model);
   kernel.attach({});
   const MatrixXd bare = sum_of(form.torques(kernel, model.dof()));
   std::vector<MatrixXd> columns;
   for (std::size_t i = 0; i < count; ++i) {
     controller::Attachment unit;
-    if (i == 0) {
-      unit.mass = 1;
-    } else if (i < 4) {
-      unit.first_moment[static_cast<Index>(i) - 1] = 1;
-    } else {
-      const auto [row, col] = kEntries[i - 4];
-      unit.inertia(row, col) = unit.inertia(col, row) = 1;
-    }
+    add_to_body(unit, static_cast<Index>(i), 1);
     kernel.attach(unit);
     columns.emplace_back(sum_of(form.torques(kernel, model.dof())) - bare);
   }

@@ -1,5 +1,9 @@
 // Calibrates arms that MuJoCo moves, from records of ordinary motion of 30 s, and compares what is
 // found with the truth, and with ordinary least squares.
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/apps/check_model/calibrated_modes.hpp>
+#include <dashpot/controller/default_settings.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/identification/check_model.hpp>
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/least_squares_arm.hpp>
@@ -23,6 +27,7 @@ using Eigen::Index;
 constexpr double kKnownWithin = 0.1;  // of a rotor that is called determined
 constexpr double kNominal = 0.95;     // share of truths within 95 % intervals
 constexpr double kLeastHeld = 0.9, kMostHeld = 0.98;
+constexpr int kFew = 40;  // of one record or two, whose errors belong together
 constexpr double kAllRecords = 60;
 
 /// A row of the table.
@@ -61,7 +66,6 @@ struct Held {
   }
   /// Whether the share is 90 to 98 %, but for two standard deviations of chance.
   bool good() const {
-    constexpr int kFew = 40;  // of one record or two, whose errors belong together
     const double chance = 2 * std::sqrt(kNominal * (1 - kNominal) * all);
     return all < kFew ||
            (inside >= kLeastHeld * all - chance && inside <= kMostHeld * all + chance);
@@ -72,7 +76,9 @@ struct Tally {
   Held rotors, friction, offsets, payload, delay, plain;
   int joints = 0, determined = 0, within = 0, plain_within = 0;
   int tilted = 0, linked = 0, either = 0, suspected = 0;
-  double worst = 0, worst_delay = 0, worst_tilt = 0, time = 0, plain_time = 0;
+  Held frequencies, ratios;
+  int modes = 0, modes_known = 0, modes_within = 0;
+  double worst = 0, worst_mode = 0, worst_delay = 0, worst_tilt = 0, time = 0, plain_time = 0;
 };
 
 double processor_seconds() {
@@ -114,6 +120,72 @@ void add(const MovedArm& arm, const dashpot::identification::ModelCheck& check, 
                                      .angularDistance(Eigen::Quaterniond::Identity()));
 }
 
+JointVector middle(const Config& config) {
+  JointVector q(config.model.dof());
+  for (Index j = 0; j < q.size(); ++j) {
+    const Joint& joint = config.model.joints()[static_cast<std::size_t>(j)];
+    q[j] = 0.5 * (std::max(joint.lower, -2.5) + std::min(joint.upper, 2.5)) + 0.3;
+  }
+  return q;
+}
+
+/// Springs in the joints of 15 to 60 rad/s and dampers for ratios of 0.4 to 1 of joints that do not
+/// move each other, in a loop that knows the arm as its description has it.
+Config loop_of(const MovedArm& arm, Dice& dice) {
+  Config config{arm.description, arm.description.model(), {}};
+  config.settings = default_settings(config.model);
+  config.settings.initial.mode = Mode::kJoint;
+  Gains& gains = config.settings.initial.gains;
+  gains.joint_damping_ratio = 0;
+  DynamicsResult at;
+  DynamicsKernel(config.model).evaluate(middle(config), 0 * middle(config), at);
+  for (Index j = 0; j < arm.n; ++j) {
+    const double inertia = at.M(j, j) + arm.rotors[j], omega = dice.log_uniform(15, 60);
+    gains.joint_stiffness(j, j) = inertia * omega * omega;
+    gains.joint_damping(j, j) = 2 * dice.uniform(0.4, 1) * inertia * omega;
+  }
+  return config;
+}
+
+/// Compares the modes of the calibrated loop with the modes of the true arm's.
+void add_modes(const MovedArm& arm, const dashpot::identification::ModelCheck& check, Dice& dice,
+               Tally& tally) {
+  const Config config = loop_of(arm, dice);
+  RobotDescription robot = arm.description;
+  robot.options.reflected_inertia = arm.rotors;
+  robot.options.viscous_friction = arm.viscous;
+  robot.options.payload = {arm.payload.mass, arm.payload.center, arm.payload.about_center};
+  robot.options.gravity = arm.gravity;
+  Settings settings = config.settings;
+  settings.analysis.sampled.delay = arm.delay;
+  PostureLoop posture_loop(robot.model(), settings);
+  const LoopAt at = posture_loop.at(middle(config), settings.initial.gains, Mode::kJoint);
+  const auto truth = sample_loop(at.system, dashpot::analysis::analyze(at.system), at.sampled);
+  const dashpot::apps::CalibratedLoop found =
+      dashpot::apps::calibrated_loop(config, check, middle(config));
+  constexpr double kLeastRatio = 0.4, kMostRatio = 1, kNear = 0.05;
+  for (const auto& mode : truth.modes) {
+    if (!(mode.damping_ratio >= kLeastRatio && mode.damping_ratio <= kMostRatio)) continue;
+    const auto far = [&mode](const dashpot::apps::CalibratedMode& one) {
+      return std::max(std::abs(one.natural_frequency / mode.natural_frequency - 1),
+                      std::abs(one.damping_ratio / mode.damping_ratio - 1));
+    };
+    const auto near =
+        *std::min_element(found.modes.begin(), found.modes.end(),
+                          [&far](const auto& a, const auto& b) { return far(a) < far(b); });
+    ++tally.modes;
+    if (1.96 * near.natural_frequency_std < kNear * near.natural_frequency &&
+        1.96 * near.damping_ratio_std < kNear * near.damping_ratio) {
+      ++tally.modes_known;
+      tally.modes_within += far(near) <= kNear ? 1 : 0;
+      tally.worst_mode = std::max(tally.worst_mode, far(near));
+    }
+    tally.frequencies.add({near.natural_frequency, near.natural_frequency_std, true},
+                          mode.natural_frequency);
+    tally.ratios.add({near.damping_ratio, near.damping_ratio_std, true}, mode.damping_ratio);
+  }
+}
+
 void print(const std::string& what, int records, const Tally& tally) {
   const auto held = [](const Held& one) {
     return std::to_string(one.inside) + " of " + std::to_string(one.all);
@@ -121,12 +193,14 @@ void print(const std::string& what, int records, const Tally& tally) {
   constexpr double kDegree = 57.29577951308232;
   std::printf(
       "| %s | %d | %d of %d, %d, %.1f %% | %s | %s | %s | %s | %s, %.2f ms | %d, %.2f deg | "
-      "%d, %d, %d | %.2f s | %d of %d, %s, %.2f s |\n",
+      "%d of %d, %d, %.1f %% | %s, %s | %d, %d, %d | %.2f s | %d of %d, %s, %.2f s |\n",
       what.c_str(), records, tally.determined, tally.joints, tally.within, 100 * tally.worst,
       held(tally.rotors).c_str(), held(tally.friction).c_str(), held(tally.offsets).c_str(),
       held(tally.payload).c_str(), held(tally.delay).c_str(), 1e3 * tally.worst_delay, tally.tilted,
-      kDegree * tally.worst_tilt, tally.linked, tally.either, tally.suspected, tally.time / records,
-      tally.plain_within, tally.joints, held(tally.plain).c_str(), tally.plain_time / records);
+      kDegree * tally.worst_tilt, tally.modes_known, tally.modes, tally.modes_within,
+      100 * tally.worst_mode, held(tally.frequencies).c_str(), held(tally.ratios).c_str(),
+      tally.linked, tally.either, tally.suspected, tally.time / records, tally.plain_within,
+      tally.joints, held(tally.plain).c_str(), tally.plain_time / records);
   std::fflush(stdout);
 }
 
@@ -138,8 +212,10 @@ bool calibrate(const Request& request) {
   std::printf(
       "seed %lu\n| records | | rotors determined, within 10 %%, worst | inside 95 %%: rotors | "
       "friction | offsets | payload | delay, worst of those determined | gravity: told, worst | "
-      "link named, link or payload, other suspicions | time | least squares: rotors within 10 %%, "
-      "inside, time |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+      "modes of ratio 0.4 to 1 known to 5 %%, within 5 %%, worst | inside 95 %%: frequencies, "
+      "ratios | link named, link or payload, "
+      "other suspicions | time | least squares: rotors within 10 %%, "
+      "inside, time |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
       request.seed);
   const std::vector<dashpot::testing::Arm> arms = all_arms();
   bool good = true;
@@ -168,6 +244,7 @@ bool calibrate(const Request& request) {
           dashpot::identification::check_model(arm.description, {record}, {0.2, false});
       tally.time += processor_seconds() - begin;
       add(arm, check, tally);
+      if (row.late == 0 && row.heavier == 0) add_modes(arm, check, dice, tally);
       begin = processor_seconds();
       const std::vector<dashpot::identification::Estimate> plain =
           rotors_by_least_squares(arm.description, record);
@@ -181,7 +258,9 @@ bool calibrate(const Request& request) {
     }
     print(row.what, records, tally);
     good = good && tally.within >= 0.98 * tally.determined && tally.rotors.good() &&
-           tally.friction.good() && tally.offsets.good();
+           tally.friction.good() && tally.offsets.good() && tally.frequencies.good() &&
+           tally.ratios.good() &&
+           (tally.modes_known < kFew || tally.modes_within >= kLeastHeld * tally.modes_known);
   }
   return good;
 }
