@@ -17,6 +17,27 @@ void take(const Hypothesis& hypothesis, TorqueFit& fit) {
   fit.result = robust_fit(fit.linear);
 }
 
+/// Friction that Coulomb's and a viscous one do not explain.
+void add_frictions(const TorqueFit& fit, std::vector<Hypothesis>& all) {
+  constexpr double kSlow = 0.1;  // rad/s (m/s)
+  const MatrixXd slow = fit.form.slow_sign(kSlow);
+  for (Index j = 0; j < fit.n; ++j) {
+    if (!fit.moves[j]) continue;
+    MatrixXd of_load = MatrixXd::Zero(fit.n, fit.K), at_rest = of_load;
+    for (Index k = 0; k < fit.K; ++k) {
+      of_load(j, k) = fit.linear.A(k * fit.n + j, 3 * j + 1) * std::abs(fit.model_torque(j, k));
+    }
+    at_rest.row(j) = slow.row(j);
+    const int joint = static_cast<int>(j);
+    all.push_back({joint, {std::move(of_load)}, "its Coulomb friction is", "% of its load", 100});
+    all.push_back({joint,
+                   {std::move(at_rest)},
+                   "its friction at low speed (Stribeck) is",
+                   fit.torque_unit(j).substr(1),
+                   1});
+  }
+}
+
 /// Words for the hypothesis taken last, if it has one column.
 std::string what_it_is(const Hypothesis& hypothesis, const RobustFit& result) {
   const Index last = result.value.size() - 1;
@@ -126,6 +147,7 @@ std::optional<Eigen::Vector3d> explain(TorqueFit& fit, const controller::RobotDe
   fit.narrow_payload(check);
   std::vector<Hypothesis> hypotheses =
       list_hypotheses(robot, fit.model, fit.form, fit.model_torque);
+  add_frictions(fit, hypotheses);
   if (check.kind != TorqueKind::kWhole) {  // the robot holds its weight itself
     std::erase_if(hypotheses,
                   [](const Hypothesis& h) { return h.what == "its torque reads" || h.gravity; });

@@ -107,6 +107,12 @@ MatrixXd WeakForm::sign(const VectorXd& v0) const {
   });
 }
 
+MatrixXd WeakForm::slow_sign(double v0) const {
+  return means(f_, [v0](const SmoothRun& run) {
+    return MatrixXd(run.velocity.array().sign() * (-(run.velocity / v0).array().square()).exp());
+  });
+}
+
 MatrixXd WeakForm::slow_share(const VectorXd& v0) const {
   return means(f_, [&v0](const SmoothRun& run) {
     const MatrixXd relative = v0.cwiseInverse().asDiagonal() * run.velocity.cwiseAbs();

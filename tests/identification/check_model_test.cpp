@@ -344,5 +344,22 @@ TEST(CheckModel, RefusesWhatIsNoRecord) {
   EXPECT_THAT(refusal(arm.record(17)), HasSubstr("no joint moves"));
 }
 
+TEST(CheckModel, TellsFrictionThatGrowsWithLoadOrAtLowSpeed) {
+  RecordedArm arm = loaded_panda();
+  arm.description.options.payload = {};
+  arm.of_load = 0.1;
+  const ModelCheck loaded = check_model(panda(), {arm.record(5)}, {0, true});
+  EXPECT_THAT(loaded.joints[1].suspicious, HasSubstr("its Coulomb friction is 10 +- "));
+  EXPECT_THAT(loaded.joints[1].suspicious, HasSubstr("% of its load more than the model says"));
+  EXPECT_NEAR(loaded.joints[1].coulomb_friction.value, arm.coulomb[1], 0.1);
+  arm.of_load = 0;
+  arm.at_rest = 1.5;
+  const ModelCheck sticky = check_model(panda(), {arm.record(6)}, {0, true});
+  EXPECT_THAT(sticky.joints[1].suspicious,
+              HasSubstr("its friction at low speed (Stribeck) is 1.5 +- 0.0"));
+  arm.at_rest = 0;
+  EXPECT_THAT(check_model(panda(), {arm.record(6)}, {0, true}).joints[1].suspicious, IsEmpty());
+}
+
 }  // namespace
 }  // namespace dashpot::identification

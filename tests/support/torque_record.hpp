@@ -26,8 +26,9 @@ struct RecordedArm {
   Eigen::VectorXd center = {};                                       ///< of the motion; empty: zero
   double duration = 20, rate = 500, amplitude = 0.5, slowest = 0.1;  ///< s, Hz, rad, Hz
   double position_noise = 1e-5, torque_noise = 0.05;
-  double slow_noise = 0;  ///< of the torques, with a correlation of 0.3 s
-  double quantum = 0;     ///< of the positions
+  double of_load = 0, at_rest = 0;  ///< friction of joint 2: share of its load; more if slow, N m
+  double slow_noise = 0;            ///< of the torques, with a correlation of 0.3 s
+  double quantum = 0;               ///< of the positions
   /// The robot holds the weight of its own model itself, and its torques leave it out; or, external
   /// torques, all of it.
   bool without_gravity = false, external_only = false;
@@ -65,6 +66,9 @@ struct RecordedArm {
       Eigen::VectorXd torque =
           offset + viscous.cwiseProduct(qd) + Eigen::VectorXd(coulomb.array() * qd.array().sign());
       torque += at.M * qdd + at.coriolis + at.gravity;
+      const double load = (at.M * qdd + at.coriolis + at.gravity)[1];
+      torque[1] += (of_load * std::abs(load) + at_rest * std::exp(-100 * qd[1] * qd[1])) *
+                   (qd[1] > 0 ? 1 : -1);
       if (without_gravity || external_only) {
         own.solve(q, qd);
         const controller::DynamicsResult known = own.result();
