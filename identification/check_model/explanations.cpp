@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <utility>
 
 namespace dashpot::identification {
 namespace {
@@ -21,20 +22,18 @@ void take(const Hypothesis& hypothesis, TorqueFit& fit) {
 void add_frictions(const TorqueFit& fit, std::vector<Hypothesis>& all) {
   constexpr double kSlow = 0.1;  // rad/s (m/s)
   const MatrixXd slow = fit.form.slow_sign(kSlow);
+  const auto add = [&](Index j, const Eigen::RowVectorXd& row, std::string what, std::string unit,
+                       double factor) {
+    MatrixXd column = MatrixXd::Zero(fit.n, fit.K);
+    column.row(j) = row;
+    all.push_back({static_cast<int>(j), {column}, std::move(what), std::move(unit), factor});
+  };
   for (Index j = 0; j < fit.n; ++j) {
     if (!fit.moves[j]) continue;
-    MatrixXd of_load = MatrixXd::Zero(fit.n, fit.K), at_rest = of_load;
-    for (Index k = 0; k < fit.K; ++k) {
-      of_load(j, k) = fit.linear.A(k * fit.n + j, 3 * j + 1) * std::abs(fit.model_torque(j, k));
-    }
-    at_rest.row(j) = slow.row(j);
-    const int joint = static_cast<int>(j);
-    all.push_back({joint, {std::move(of_load)}, "its Coulomb friction is", "% of its load", 100});
-    all.push_back({joint,
-                   {std::move(at_rest)},
-                   "its friction at low speed (Stribeck) is",
-                   fit.torque_unit(j).substr(1),
-                   1});
+    const auto sign = fit.linear.A.col(3 * j + 1).reshaped(fit.n, fit.K).row(j);
+    add(j, sign.cwiseProduct(fit.model_torque.row(j).cwiseAbs()), "its Coulomb friction is",
+        "% of its load", 100);
+    add(j, slow.row(j), "its friction at low speed (Stribeck) is", fit.torque_unit(j).substr(1), 1);
   }
 }
 
