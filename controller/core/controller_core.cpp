@@ -112,7 +112,8 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   if (wrench_known) sensed_.external_wrench = state.external_wrench;
 
   // Evaluate the robot there, with what it carries now.
-  if (!setpoints_.attachment().still()) {
+  const bool same_body = setpoints_.attachment().still();
+  if (!same_body) {
     const Pose before = setpoints_.attachment().now().tool;
     setpoints_.step_attachment();
     kernel_.attach(setpoints_.attachment().now());
@@ -121,7 +122,9 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   kernel_.evaluate(sensed_.q, sensed_.qd, sensed_.robot);
   if (settings_.feed_forward.gravity) sensed_.weight = sensed_.robot.gravity;
   filter_.assume(sensed_.weight);
-  if (tank_.on()) tank_.count_work(sensed_.q, sensed_.weight, sensed_.dt);
+  if (tank_.on()) {
+    tank_.count_work(sensed_.q, sensed_.robot.M, sensed_.weight, sensed_.dt, same_body);
+  }
 
   // Take over the set-point.
   Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;

@@ -18,7 +18,7 @@ EnergyTank::EnergyTank(const RobotModel& model, const Settings& settings)
       lag_(settings.analysis.sampled.cutoff > 0 ? 1 / (kTurn * settings.analysis.sampled.cutoff)
                                                 : 0),
       passed_(lag_ > 0 ? 1 - std::exp(-period_ / lag_) : 1),
-      on_its_way_((settings.analysis.sampled.delay + 1) * period_ + lag_),
+      late_((settings.analysis.sampled.delay + 0.5) * period_ + lag_),
       weakened_(model.dof()),
       delay_(static_cast<std::size_t>(settings.analysis.sampled.delay)),
       per_rate_(settings.limits.torque_rate.cwiseInverse()),
@@ -38,24 +38,37 @@ void EnergyTank::fill() noexcept {
   no_springs();
 }
 
-void EnergyTank::count_work(const JointVector& q, const JointVector& weight, double dt) noexcept {
+void EnergyTank::count_work(const JointVector& q, const JointMatrix& M, const JointVector& weight,
+                            double dt, bool same_body) noexcept {
   constexpr double kOnTime = 1.5;            // periods
+  constexpr double kWindow = 0.05;           // s
   constexpr double kLostOfCoulomb = 0.0028;  // rad/s: c v tanh(v / 0.01 rad/s) >= c (|v| - this)
   const double before = level_;
   const bool on_time = dt <= kOnTime * period_;
-  weight_change_ = known_ && on_time ? difference(weight, weight_) : JointVector::Zero(q.size());
   if (known_ && applied_ > delay_) {
     const JointVector& tau = torques_[(applied_ - 1 - delay_) % torques_.size()];
     for (Eigen::Index i = 0; i < q.size(); ++i) {
-      const double dq = q[i] - q_[i];
-      const double dissipated = viscous_[i] * dq * dq / dt +
-                                coulomb_[i] * std::max(0.0, std::abs(dq) - kLostOfCoulomb * dt);
-      level_ -= (tau[i] - 0.5 * (weight_[i] + weight[i])) * dq - dissipated;
+      level_ -= (tau[i] - 0.5 * (weight_[i] + weight[i])) * (q[i] - q_[i]);
     }
-    level_ = std::min(level_, store_ + committed_);
     // Where states were missing other torques acted meanwhile, so nothing is gained.
     if (!on_time) level_ = std::min(level_, before);
   }
+  window_ += dt;
+  if (known_ && on_time && window_ >= kWindow) {  // a shorter one takes noise for motion
+    for (Eigen::Index i = 0; i < q.size(); ++i) {
+      const double dq = q[i] - window_q_[i];
+      level_ += viscous_[i] * dq * dq / window_ +
+                coulomb_[i] * std::max(0.0, std::abs(dq) - kLostOfCoulomb * window_);
+    }
+  }
+  if (!known_ || !on_time || window_ >= kWindow) {
+    window_ = 0;
+    window_q_ = q;
+  }
+  level_ = std::min(level_, store_ + committed_);
+  if (!known_ || !same_body) smoothed_weight_ = weight;
+  add(difference(weight, smoothed_weight_), smoothed_weight_, 1 - std::exp(-dt / late_));
+  mass_.compute(M, 1e-14 * M.trace());
   known_ = true;
   q_ = q;
   weight_ = weight;
@@ -105,10 +118,29 @@ bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight
     }
   }
   energy = std::max(0.0, energy);  // of a K that couples what the error clamp shortens apart
-  mass_.compute(law.robot.M, 1e-14 * law.robot.M.trace());
-  const double lasting = applied_ > 0 ? under_way(difference(put_out_, weight), law.qd) : 0;
-  const double there = std::max(0.0, level_ - kReserve * store_ - lasting);
-  share_ = std::min(energy > there ? there / energy : 1, affordable(pull, law.qd, there));
+  const JointVector against = torque_against(law), moving = difference(asked.dampers, against);
+  JointVector further = difference(asked.torque, against);
+  add(pull, further, -1);
+  add(weight, further, -1);
+
+  double fade = 0;  // s
+  for (Eigen::Index i = 0; i < pull.size(); ++i) {
+    const double largest = std::abs(against[i]) + std::abs(pull[i]) + std::abs(further[i]);
+    fade = std::max(fade, largest * per_rate_[i]);
+  }
+  const double lasts = period_ + 0.5 * fade;
+  JointVector motion = law.qd;
+  mass_.multiply_LT(motion.data());
+  const double speed = motion.norm(), there = std::max(0.0, level_ - kReserve * store_);
+  double left = std::max(
+      0.0, std::sqrt(speed * speed + 2 * there) - speed - under_way() - lasts * size(against));
+  const auto spend = [&left, lasts](double most) {
+    const double wanted = lasts * most, spent = std::min(wanted, left);
+    left -= spent;
+    return wanted > spent ? spent / wanted : 1;
+  };
+  share_ = energy > there ? there / energy : 1;
+  share_ *= spend(share_ * size(pull));
   committed_ = share_ * energy;
   if (share_ < 1) {
     weakened_ = impedance;
@@ -117,42 +149,36 @@ bool EnergyTank::limit(const ImpedanceLaw::Input& law, const JointVector& weight
     weakened_.tool.stiffness *= share_;
     weakened_.null_stiffness *= share_;
   }
-  const JointVector against = torque_against(law), moving = difference(asked.dampers, against);
-  JointVector further = difference(asked.torque, against);
-  add(pull, further, -1);
-  add(weight, further, -1);
-  const double fed = affordable(further, law.qd, there - committed_);
+  const double fed = spend(size(further));
   add(pull, asked.torque, share_ - 1);
   add(further, asked.torque, fed - 1);
   add(moving, asked.dampers, fed - 1);
-  // The weight that the torque will meet: one that comes late feeds a moving arm.
-  add(weight_change_, asked.torque, on_its_way_ / period_ - 0.5);
   asked.tip_wrench += (share_ - 1) * asked.tip_pull;
+  // The weight that the torque will meet: one that comes late feeds a moving arm.
+  add(difference(weight, smoothed_weight_), asked.torque);
   return share_ < 1 || fed < 1;
 }
 
-double EnergyTank::affordable(const JointVector& torque, const JointVector& qd,
-                              double energy) const noexcept {
-  const double spent = under_way(torque, qd);
-  return spent > energy ? energy / spent : 1;
+double EnergyTank::size(JointVector torque) const noexcept {
+  mass_.solve_L(torque.data());
+  return torque.norm();
 }
 
-double EnergyTank::under_way(const JointVector& torque, const JointVector& qd) const noexcept {
-  JointVector momentum = torque;
-  double energy = 0;
-  for (Eigen::Index i = 0; i < torque.size(); ++i) {
-    momentum[i] *= on_its_way_ + 0.5 * std::abs(torque[i]) * per_rate_[i];
-    energy += std::abs(momentum[i] * qd[i]);
+double EnergyTank::under_way() const noexcept {
+  if (applied_ == 0) return 0;
+  double sum = lag_ * sizes_[(applied_ - 1) % sizes_.size()];
+  for (std::size_t k = 1; k <= std::min(delay_, applied_); ++k) {
+    sum += period_ * sizes_[(applied_ - k) % sizes_.size()];
   }
-  mass_.solve_L(momentum.data());
-  return energy + 0.5 * momentum.squaredNorm();
+  return sum;
 }
 
 void EnergyTank::apply(const JointVector& torque) noexcept {
   if (applied_ == 0) acting_ = torque;
-  put_out_ = torque;
   add(difference(torque, acting_), acting_, passed_);
-  torques_[applied_++ % torques_.size()] = acting_;
+  const std::size_t slot = applied_++ % torques_.size();
+  torques_[slot] = acting_;
+  sizes_[slot] = known_ ? size(difference(acting_, weight_)) : 0;
 }
 
 }  // namespace dashpot::controller

@@ -13,17 +13,21 @@ namespace dashpot::controller {
 /// where dU = 1/2 (g_k + g_k+1)' dq is the change of the potential energy whose torque the
 /// controller compensates. E is the energy of the springs as they are stretched now,
 ///     E = 1/2 (e_q' K_q e_q + e' K_C e + e_0' K_0 e_0).
-/// What the last torque spends until it can be gone is never available: R = S - reserve - that.
-/// - Springs act with the share s = min(1, R / E) of their torque: they cannot release more than
-///   there is. Gains that grow and references that move away so wait for energy.
-/// - Springs spend at most R until they can be gone; feed-forward, and what dampers add because
-///   references move, at most R - s E.
-/// - The weight is extrapolated to the middle of the time in which the torque acts.
+/// A torque acts for a tick and the delay, is smoothed by the drives' low-pass and fades no faster
+/// than its rate allows. With M = L L', it changes |L' qd| by at most the integral P of |L^-1 tau|
+/// until it is gone, so that it spends at most |L' qd| P + P^2 / 2, whatever contacts that have no
+/// energy do to the velocity.
+/// - The torques under way and the new one spend at most S - reserve.
+/// - Springs act with a share s of at most (S - reserve) / E of their torque: they cannot release
+///   more than there is. Gains that grow and references that move away so wait for energy.
+/// - Feed-forward, and what dampers add because references move, spend what springs leave.
 /// - What dampers would do if no reference moved acts in full, and what they dissipate returns to
 ///   S, which is at most store + s E.
+/// - The weight is extrapolated to the time at which the torque acts, by a low-pass of that delay.
 /// While no springs act, the brake has its torque, and what it dissipates fills the tank likewise.
-/// Viscous friction of the model counts with b dq^2 / T, which it dissipates at least, and Coulomb
-/// friction with c (|dq| - 0.0028 rad/s T), less than c tanh(v / 0.01 rad/s) dissipates.
+/// In a window of T = 50 ms, viscous friction of the model counts with b dq^2 / T, which it
+/// dissipates at least, and Coulomb friction with c (|dq| - 0.0028 rad/s T), less than
+/// c tanh(v / 0.01 rad/s) dissipates.
 class EnergyTank {
  public:
   EnergyTank(const RobotModel& model, const Settings& settings);
@@ -33,8 +37,10 @@ class EnergyTank {
   void reset() noexcept;
   /// Fills the tank; the torques under way still count.
   void fill() noexcept;
-  /// Counts the work since the last tick. `weight`: the gravity torque that is compensated, n.
-  void count_work(const JointVector& q, const JointVector& weight, double dt) noexcept;
+  /// Counts the work since the last tick. `weight`: the gravity torque that is compensated, n; of
+  /// the `same_body` at the tip as in the last tick.
+  void count_work(const JointVector& q, const JointMatrix& M, const JointVector& weight, double dt,
+                  bool same_body) noexcept;
   /// Scales a torque of the law, in place. True if that changed it.
   bool limit(const ImpedanceLaw::Input& law, const JointVector& weight, LawTorque& asked) noexcept;
   /// No springs act.
@@ -54,25 +60,26 @@ class EnergyTank {
  private:
   static constexpr std::size_t kMostDelay = 20;  // ticks, as analysis.sampled.delay
 
-  /// Returns the energy that a torque spends, J, until delay, low-pass and the limit of its rate
-  /// let it go: |qd_i p_i| for every joint and 1/2 p' M^-1 p, with p_i = tau_i (delay + lag +
-  /// |tau_i| / (2 rate_i)), in whatever direction contacts turn the joints.
-  double under_way(const JointVector& torque, const JointVector& qd) const noexcept;
-  /// Returns the share of a torque that spends at most `energy` so.
-  double affordable(const JointVector& torque, const JointVector& qd, double energy) const noexcept;
+  /// Returns |L^-1 torque|.
+  double size(JointVector torque) const noexcept;
+  /// Returns the integral of |L^-1 tau| of the torques that were put out and still act.
+  double under_way() const noexcept;
 
   double store_;                  ///< J; 0: there is no tank
   double period_, lag_, passed_;  ///< s; of the drives' low-pass: s, share that passes in a tick
-  double on_its_way_;             ///< s: a torque acts in full, and is gone, after that
+  double late_;                   ///< s, the middle of a tick's torque
   double level_ = 0, committed_ = 0, share_ = 1;
   Impedance weakened_;
   std::size_t delay_, applied_ = 0;  ///< ticks; torques that were put out
   bool known_ = false;               ///< q_ and weight_
   JointVector per_rate_;             ///< s/(N m)
   JointVector viscous_, coulomb_;
-  JointVector q_, weight_, acting_, put_out_, weight_change_;
+  JointVector q_, weight_, acting_, smoothed_weight_;
+  double window_ = 0;  ///< s
+  JointVector window_q_;
   SmallCholesky mass_;
   std::array<JointVector, kMostDelay + 1> torques_;
+  std::array<double, kMostDelay + 1> sizes_{};  ///< |L^-1 tau| of them beyond the weight
 };
 
 }  // namespace dashpot::controller

@@ -11,21 +11,22 @@ using dashpot::testing::FedArm;
 
 /// What is seen of all policies in one engine.
 struct Seen {
-  int policies = 0, weakened = 0, beyond = 0, broken = 0;
+  int policies = 0, weakened = 0, braked = 0, beyond = 0, broken = 0;
   double most = 0, free = 0;  ///< of the energy given, in stores
 
   void add(const FedArm& arm, const FedArm::Fed& bound, const FedArm::Fed& unbound) {
     constexpr double kExact = 1e-6;  // of the store
     ++policies;
     weakened += bound.share < 1 ? 1 : 0;
+    braked += bound.braked ? 1 : 0;
     beyond += unbound.most > arm.store ? 1 : 0;
     broken += bound.most > (1 + kExact) * arm.store ? 1 : 0;
     most = std::max(most, bound.most / arm.store);
     free = std::max(free, unbound.most / arm.store);
   }
   bool print(const char* engine) const {
-    std::printf("| %s | %d | %d, %.6f | %d | %d, %.0f |\n", engine, policies, broken, most,
-                weakened, beyond, free);
+    std::printf("| %s | %d | %d, %.6f | %d, %d | %d, %.0f |\n", engine, policies, broken, most,
+                weakened, braked, beyond, free);
     return broken == 0 && (policies < 10 || beyond > 0);
   }
 };
@@ -34,7 +35,7 @@ bool feed(const dashpot::stress::Request& request) {
   const auto policies = static_cast<std::uint64_t>(request.whole());
   std::printf(
       "seed %lu\n| engine | policies | beyond the store with a tank, most in stores | springs "
-      "weakened | beyond it without one, most |\n|---|---|---|---|---|\n",
+      "weakened, stopped | beyond it without one, most |\n|---|---|---|---|---|\n",
       request.seed);
   Seen stand_in, mujoco;
   constexpr std::uint64_t kOfMujoco = 50;  // one in so many, and at least three

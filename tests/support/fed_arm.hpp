@@ -38,14 +38,19 @@ struct FedArm {
     s.energy.store = store;
     s.motion.gain_time = random.log_uniform(0.001, 0.3);
     s.analysis.where = controller::Analysis::Where::kOff;
-    s.analysis.sampled.delay = random.integer(0, 2);
+    const int delay = s.analysis.sampled.delay =
+        random.integer(0, 1) == 0 ? random.integer(0, 10) : random.integer(0, 2);
+    // Dampers that are stable with this delay.
+    s.initial.gains.joint_damping /= 1 + delay / 2.0;
+    s.initial.gains.task_damping /= 1 + delay / 2.0;
     s.watchdog.feedback = 0;
     s.watchdog.setpoint_hold = s.watchdog.setpoint_damp = 0;
     s.limits.beyond_model = true;
     s.limits.gain_margin = 1;
     s.limits.velocity.setConstant(50);
     s.limits.tip_velocity = 50;
-    s.limits.torque_rate.setConstant(random.log_uniform(500, 1e5));
+    s.limits.torque_rate.setConstant(random.integer(0, 3) == 0 ? 1e7
+                                                               : random.log_uniform(500, 1e5));
     s.analysis.sampled.cutoff = random.integer(0, 2) == 0 ? random.log_uniform(20, 300) : 0;
     s.limits.torque.setConstant(1e3);
     s.limits.position_lower.setConstant(-100);
@@ -78,7 +83,7 @@ struct FedArm {
   /// springs.
   struct Fed {
     double most = 0, share = 1;
-    int braked = 0;  ///< ticks without springs
+    bool braked = false;  ///< springs ended, and with them what is counted
   };
   Fed in_stand_in(bool tank) {
     sim::Arm body(twin->robot, world);
@@ -180,13 +185,18 @@ struct FedArm {
         setpoint.gains.task_stiffness = factor * base.task_stiffness;
         setpoint.time = state.time;
       }
+      if (k % 500 == 300) {
+        setpoint.wrench.head<3>() = 20 * policy.vector(3);
+        setpoint.time = state.time;
+      }
       if (k % 500 == 100) {
         setpoint.joint_position = start + 0.3 * policy.vector(static_cast<int>(start.size()));
         setpoint.tip_pose.position = there.p_BT_B + 0.1 * policy.vector(3);
         setpoint.time = state.time;
       }
       if (controller.update(state, setpoint, torque) >= controller::Status::kSetpointStale) {
-        ++fed.braked;
+        fed.braked = true;  // the brake is not bound by the tank
+        break;
       }
       fed.share = std::min(fed.share, controller.snapshot().spring_share);
       fed.most = std::max(fed.most, step(torque));
