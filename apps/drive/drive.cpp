@@ -181,11 +181,11 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     if (session.running()) {
       goals.follow(since(began), session.record.stopped > stopped);
     } else {
-      goals.check_start(status.position);
       stopped = session.record.stopped;
     }
     const bool answers = session.take(status, inbox.arrived, now, command);
     if (!ran && session.running()) {
+      goals.check_start(status.position);  // nothing was sent yet
       began = Clock::now();
       std::fprintf(
           stderr, "%s\n",
