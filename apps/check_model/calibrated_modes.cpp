@@ -22,6 +22,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using identification::ModelCheck;
 
+constexpr double kMostDelay = 20;  // ticks, as analysis.sampled.delay
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 analysis::SampledSpectrum spectrum_of(const RobotModel& model, const controller::Settings& settings,
@@ -49,7 +50,7 @@ struct Found {
 
   Found(const Config& config, const ModelCheck& check)
       : robot(calibrated_robot(config, check)), attachment(robot.model().attachment()) {
-    if (determined_payload(check)) attachment = check.attachment;
+    if (std::isfinite(check.payload.mass.deviation)) attachment = check.attachment;
     for (std::size_t j = 0; j < check.joints.size(); ++j) {
       const auto fill = [j](const identification::Estimate& one, JointVector& values) {
         double& value = values[static_cast<Index>(j)];
@@ -100,15 +101,20 @@ CalibratedLoop calibrated_loop(const Config& config, const ModelCheck& check,
   const double ticks = check.delay.value / settings.period - 0.5;
   CalibratedLoop loop;
   int& delay = settings.analysis.sampled.delay;
-  const bool longer = std::isfinite(check.delay.deviation) && std::round(ticks) > delay;
-  if (longer) delay = static_cast<int>(std::round(ticks));
-  loop.delay_found = longer && check.delay.determined;
+  const double found_ticks = std::min(kMostDelay, std::round(ticks));
+  if (std::isfinite(check.delay.deviation) && found_ticks > delay) {
+    delay = static_cast<int>(found_ticks);
+    loop.delay_found = check.delay.determined && std::round(ticks) <= kMostDelay;
+  }
   loop.delay = delay;
   const analysis::SampledSpectrum spectrum = spectrum_of(found.model(), settings, q);
   loop.stable = spectrum.stable();
   const VectorXd values = values_of(spectrum.modes);
-  const auto values_at = [&](const Found& arm) {
-    return values_of(spectrum_of(arm.model(), settings, q).modes);
+  const auto change_by = [&](const Found& arm, double step) {
+    const VectorXd there = values_of(spectrum_of(arm.model(), settings, q).modes);
+    if (there.size() != values.size())
+      return VectorXd(VectorXd::Constant(values.size(), kInfinity));
+    return VectorXd((there - values) / step);
   };
   const Index n = config.model.dof();
   std::vector<Index> which;
@@ -119,34 +125,38 @@ CalibratedLoop calibrated_loop(const Config& config, const ModelCheck& check,
   for (std::size_t k = 0; k < which.size(); ++k) {
     // The deviation of the parameter, but within the range where the modes are linear in it.
     const double step = std::min(1e-4, 0.1 * std::sqrt(check.covariance(which[k], which[k])));
-    J.col(static_cast<Index>(k)) = (values_at(found.moved(which[k], step)) - values) / step;
+    J.col(static_cast<Index>(k)) = change_by(found.moved(which[k], step), step);
   }
   if (std::isfinite(check.delay.deviation)) {
     const int last = delay++;
     which.push_back(4 * n + 10);
     J.conservativeResize(Eigen::NoChange, J.cols() + 1);
-    J.rightCols(1) = (values_at(found) - values) / settings.period;
+    J.rightCols(1) = change_by(found, settings.period);
     delay = last;
   }
   MatrixXd covariance = J * check.covariance(which, which) * J.transpose();
-  // A rotor of which the records know nothing may be as large as the joint's inertia.
-  for (std::size_t j = 0; j < check.joints.size(); ++j) {
-    const auto i = static_cast<Index>(j);
-    if (std::isfinite(check.joints[j].reflected_inertia.deviation) ||
-        found.robot.options.reflected_inertia[i] > 0) {
-      continue;
-    }
-    constexpr double kStep = 1e-4, kUnchanged = 0.05;
-    const VectorXd there = values_at(found.moved(3 * n + 10 + i, kStep));
-    const double inertia = controller::evaluate(found.model(), q, 0 * q).M(i, i);
+  // A rotor of which the records know nothing may be as large as the joint's inertia, and viscous
+  // friction may stop it within a tenth of a second.
+  constexpr double kStep = 1e-4, kUnchanged = 0.05, kRate = 10;  // 1/s
+  const auto doubt = [&](const identification::Estimate& one, double known, Index i, double size) {
+    if (std::isfinite(one.deviation) || known > 0) return;
+    const VectorXd change = size * change_by(found.moved(i, kStep), kStep);
     for (Index k = 0; k < values.size(); ++k) {
-      const double change = inertia * std::abs(there[k] - values[k]) / kStep;
-      if (change > kUnchanged * std::abs(values[k])) covariance(k, k) = kInfinity;
+      if (!(std::abs(change[k]) <= kUnchanged * std::abs(values[k]))) covariance(k, k) = kInfinity;
     }
+  };
+  const controller::ModelOptions& options = found.robot.options;
+  const controller::JointMatrix M = controller::evaluate(found.model(), q, 0 * q).M;
+  for (Index j = 0; j < n; ++j) {
+    const identification::JointCheck& joint = check.joints[static_cast<std::size_t>(j)];
+    doubt(joint.reflected_inertia, options.reflected_inertia[j], 3 * n + 10 + j, M(j, j));
+    doubt(joint.viscous_friction, options.viscous_friction[j], 3 * j + 2, kRate * M(j, j));
   }
+  const auto deviation = [&covariance](Index i) {
+    return std::isfinite(covariance(i, i)) ? std::sqrt(std::max(0.0, covariance(i, i))) : kInfinity;
+  };
   for (Index i = 0; i + 1 < values.size(); i += 2) {
-    loop.modes.push_back({values[i], std::sqrt(std::max(0.0, covariance(i, i))), values[i + 1],
-                          std::sqrt(std::max(0.0, covariance(i + 1, i + 1)))});
+    loop.modes.push_back({values[i], deviation(i), values[i + 1], deviation(i + 1)});
   }
   return loop;
 }

@@ -15,8 +15,8 @@ controller::RobotDescription calibrated_robot(const controller::Config& config,
 /// with the longer of the determined delay and the configuration's. Rotors and viscous friction
 /// that neither the records determine nor the configuration has are as the records have them. The
 /// covariance of the modes is J P J', with J = d modes / d parameters, by differences, and P the
-/// covariance of the parameters; a mode has infinite deviations if it depends on a rotor of which
-/// the records know nothing.
+/// covariance of the parameters; a mode has infinite deviations if it depends on a rotor or viscous
+/// friction of which the records know nothing.
 CalibratedLoop calibrated_loop(const controller::Config& config,
                                const identification::ModelCheck& check,
                                const controller::JointVector& q);

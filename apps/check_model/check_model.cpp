@@ -100,7 +100,11 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
                                                {options.validation, report.payload_known});
     if (options.calibrates && report.check.order.empty()) {
       find_postures(records, report);
-      report.loop = calibrated_loop(config, report.check, report.rest);
+      try {
+        report.loop = calibrated_loop(config, report.check, report.rest);
+      } catch (const std::invalid_argument& error) {
+        report.notes.push_back(std::string("no modes of the calibrated loop: ") + error.what());
+      }
       note_rotors(config, report);
     }
   } catch (const controller::InvalidModel&) {

@@ -106,7 +106,7 @@ std::optional<TorqueRecord> simulate(const std::string& path, const Config& conf
     // A rotor that is not determined, or whose joint never moved, has at least its deviation.
     double& inertia = parameters.reflected_inertia[j];
     if (!one.determined && std::isfinite(one.deviation)) {
-      inertia = std::max(one.value, one.deviation);
+      inertia = std::max({inertia, one.value, one.deviation});
     }
   }
   if (!config.settings.feed_forward.gravity) parameters.gravity.setZero();  // the robot holds it

@@ -2,6 +2,7 @@
 #include <dashpot/identification/check_model/hypotheses.hpp>
 #include <dashpot/text/printable.hpp>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 namespace dashpot::identification {
@@ -135,6 +136,25 @@ void report_payload(const TorqueFit& fit, PayloadCheck& payload) {
   }
 }
 
+/// Returns the model's body at the tip with what was found, which has a mass and an inertia that is
+/// not negative; the model's if there is none.
+controller::Attachment found_body(const TorqueFit& fit) {
+  controller::Attachment body = fit.model.attachment();
+  if (fit.unseen(fit.payload())) return body;
+  for (Index i = 0; i < kPayloadColumns; ++i) {
+    add_to_body(body, i, fit.result.value[fit.payload() + i]);
+  }
+  if (!(body.mass > 0)) return fit.model.attachment();
+  const Eigen::Vector3d center = body.first_moment / body.mass;
+  const Eigen::Matrix3d of_point = body.mass * (center.squaredNorm() * Eigen::Matrix3d::Identity() -
+                                                center * center.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> about_center(body.inertia - of_point);
+  body.inertia = of_point + about_center.eigenvectors() *
+                                about_center.eigenvalues().cwiseMax(0).asDiagonal() *
+                                about_center.eigenvectors().transpose();
+  return body;
+}
+
 void report_delay(const TorqueFit& fit, Estimate& delay) {
   delay.value = fit.delay();
   if (fit.unseen(fit.rest_of_delay())) return;
@@ -180,12 +200,12 @@ void report(const TorqueFit& fit, ModelCheck& check) {
   }
   report_payload(fit, check.payload);
   report_delay(fit, check.delay);
+  check.attachment = found_body(fit);
   const Index always = fit.rest_of_delay() + 1;
-  check.attachment = fit.model.attachment();
-  for (Index i = 0; i < kPayloadColumns && !fit.unseen(fit.payload()); ++i) {
-    add_to_body(check.attachment, i, fit.result.value[fit.payload() + i]);
-  }
   check.covariance = fit.result.covariance.topLeftCorner(always, always);
+  if (fit.spread.size() > 0) {
+    check.covariance += fit.spread.head(always) * fit.spread.head(always).transpose();
+  }
   if (check.order.empty()) report_suspicions(fit, check);
   report_ambiguities(fit, check);
   report_contacts(fit, check.contacts);
