@@ -214,8 +214,7 @@ const dashpot::stress::AddPart part(
       {60, 6, "stiffening", "three of lightly damped arms whose springs stiffen"},
       {50, 2, "shaken", "two minutes of random torques, about 0.01 rad, at 500 Hz"},
       {20, 4, "chirps", "a chirp of torques, 0.3 to 12 Hz in 10 s at 1 kHz, about 0.02 rad"},
-      {36, 1, "arms",
-       "arms in MuJoCo with what real ones have, and ERA beside: see docs/identify.md", false},
+      {36, 1, "arms", "arms in MuJoCo with what real ones have: see docs/identify.md", false},
       {20, 2, "chirp-pairs", "two of them, with torques in two directions", false}},
      identify,
      {"SEED", "--verbose"}});

@@ -1,4 +1,3 @@
-#include <dashpot/tests/stress/era.hpp>
 #include <dashpot/tests/stress/identify_arms.hpp>
 #include <dashpot/tests/stress/recorded_arm.hpp>
 #include <dashpot/tests/support/places.hpp>
@@ -21,7 +20,6 @@ namespace dashpot::stress {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 using Json = nlohmann::json;
 
@@ -81,9 +79,10 @@ struct Found {
   double frequency = 0, frequency_std = 0, ratio = 0, ratio_std = 0;
 };
 
-double processor_time(int who) {
+/// Of the program, s.
+double processor_time() {
   rusage usage{};
-  getrusage(who, &usage);
+  getrusage(RUSAGE_CHILDREN, &usage);
   return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
          1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
@@ -161,8 +160,6 @@ struct Tally {
   int recordings = 0, believed = 0, wrong = 0, strong = 0, determined = 0, found = 0;
   int frequency_inside = 0, ratio_inside = 0;
   double time = 0, longest = 0;
-  int era_believed = 0, era_wrong = 0, era_found = 0;
-  double era_time = 0;
 };
 
 double distance(const TrueMode& mode, Complex value) {
@@ -205,46 +202,6 @@ void compare(const std::vector<TrueMode>& modes, const std::vector<Found>& all, 
   }
 }
 
-/// Means of `every` samples from, before.
-MatrixXd means(const MatrixXd& motion, Index from, Index before, Index every) {
-  MatrixXd result(motion.rows(), (before - from) / every);
-  for (Index i = 0; i < result.cols(); ++i) {
-    result.col(i) = motion.middleCols(from + i * every, every).rowwise().mean();
-  }
-  return result;
-}
-
-/// ERA on the free decays, about where they end, or on the correlations of ambient motion.
-std::vector<Complex> by_era(const Recording& recording, double rate) {
-  constexpr double kStep = 0.01;  // s: up to 50 Hz
-  constexpr Index kLags = 120;
-  const Index every = std::max<Index>(1, std::lround(kStep * rate));
-  const double step = static_cast<double>(every) / rate;
-  if (recording.decays.empty()) {
-    const MatrixXd motion = means(recording.output, 0, recording.output.cols(), every);
-    return era_poles(correlations(motion.colwise() - motion.rowwise().mean(), kLags), step);
-  }
-  std::vector<MatrixXd> decays;
-  for (const auto& [from, before] : recording.decays) {
-    const MatrixXd decay = means(recording.output, from, before, every);
-    decays.push_back(decay.colwise() - decay.rightCols(decay.cols() / 10).rowwise().mean());
-  }
-  return era_poles(decays, step);
-}
-
-void compare_era(const std::vector<TrueMode>& modes, const std::vector<Complex>& poles,
-                 Tally& tally) {
-  std::vector<bool> seen(modes.size());
-  for (const Complex pole : poles) {
-    ++tally.era_believed;
-    const std::size_t at = nearest(modes, pole);
-    const bool right = distance(modes[at], pole) < kNear;
-    tally.era_wrong += !right;
-    if (right) seen[at] = true;
-  }
-  for (std::size_t i = 0; i < modes.size(); ++i) tally.era_found += modes[i].strong && seen[i];
-}
-
 void print(const Row& row, long k, const RecordedArm& arm, const std::vector<Found>& all,
            const std::string& verdict) {
   std::printf("%s %ld: %s\n", row.what, k, verdict.c_str());
@@ -267,18 +224,14 @@ Tally tally_of(const Row& row, std::size_t number, const Request& request,
     testing::Dice draw(1'000'003 * request.seed + 1000 * number + static_cast<std::uint64_t>(k));
     RecordedArm arm(row.recipe, static_cast<std::size_t>(k), draw);
     const Recording recording = arm.record(draw);
-    const double before = processor_time(RUSAGE_CHILDREN);
+    const double before = processor_time();
     const Json report = report_on(recording, file);
-    const double time = processor_time(RUSAGE_CHILDREN) - before;
+    const double time = processor_time() - before;
     tally.time += time;
     tally.longest = std::max(tally.longest, time);
     const std::vector<Found> all = believed(report);
     if (request.verbose) print(row, k, arm, all, report["verdict"]);
     compare(arm.modes(), all, tally);
-    if (row.recipe.motion == Motion::kChirp) continue;
-    const double era_before = processor_time(RUSAGE_SELF);
-    compare_era(arm.modes(), by_era(recording, row.recipe.rate), tally);
-    tally.era_time += processor_time(RUSAGE_SELF) - era_before;
   }
   return tally;
 }
@@ -320,8 +273,8 @@ bool identify_arms(const Request& request) {
       "seed %lu\n"
       "| record | recordings | believed | false | strong modes found, and determined | inside 95 "
       "%%: frequency, "
-      "ratio | time: mean, longest | ERA: believed, false, found, time | misses |\n"
-      "|---|---|---|---|---|---|---|---|---|\n",
+      "ratio | time: mean, longest | misses |\n"
+      "|---|---|---|---|---|---|---|---|\n",
       request.seed);
   const Folder folder;
   bool good = true;
@@ -331,15 +284,10 @@ bool identify_arms(const Request& request) {
     const std::string lacks = missed(row, tally);
     good = good && (i > 0 || 2 * tally.found >= tally.strong);
     const double count = tally.recordings;
-    std::printf("| %s | %d | %d | %d | %d of %d, %d | %d, %d of %d | %.2f s, %.1f s | ", row.what,
-                tally.recordings, tally.believed, tally.wrong, tally.found, tally.strong,
+    std::printf("| %s | %d | %d | %d | %d of %d, %d | %d, %d of %d | %.2f s, %.1f s |%s |\n",
+                row.what, tally.recordings, tally.believed, tally.wrong, tally.found, tally.strong,
                 tally.determined, tally.frequency_inside, tally.ratio_inside,
-                tally.believed - tally.wrong, tally.time / count, tally.longest);
-    if (tally.era_believed > 0) {
-      std::printf("%d, %d, %d, %.2f s", tally.era_believed, tally.era_wrong, tally.era_found,
-                  tally.era_time / count);
-    }
-    std::printf(" |%s |\n", lacks.c_str());
+                tally.believed - tally.wrong, tally.time / count, tally.longest, lacks.c_str());
     std::fflush(stdout);
   }
   return good;
