@@ -1,5 +1,4 @@
 """Drives headless Chromium by its DevTools protocol over pipes, with the standard library alone."""
-import base64
 import json
 import os
 import select
@@ -143,12 +142,3 @@ class Browser:
         """Returns the addresses that the page has asked for."""
         return [event['params']['request']['url'] for event in self.events
                 if event.get('method') == 'Network.requestWillBeSent']
-
-    def screenshot(self, path, whole=True):
-        options = {'format': 'png'}
-        if whole:
-            content = self.call('Page.getLayoutMetrics')['cssContentSize']
-            options.update(captureBeyondViewport=True,
-                           clip=dict(x=0, y=0, width=content['width'], height=content['height'], scale=1))
-        with open(path, 'wb') as file:
-            file.write(base64.b64decode(self.call('Page.captureScreenshot', **options)['data']))

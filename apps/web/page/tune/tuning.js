@@ -9,13 +9,13 @@ import {Workspace} from './workspace.js';
 const kTogether = 15;  // ms that one answer waits for the other design's, to be drawn in one frame
 
 export class Tuning {
-  errors = []; timing = []; poles = [];
+  errors = []; poles = [];
   answers = {a: null, b: null};
   asked = {a: null, b: null};       // the requests of the answers
   problem = {a: '', b: ''};         // why there is no newer answer
   old = {a: false, b: false};       // whether the answers are of other designs
   chosen = null;                    // number of the mode whose shape is shown
-  current = false; moved = 0;       // whether all that is shown is of the state; when it changed, ms
+  current = false;                  // whether all that is shown is of the state
   later = 0;
 
   /// `changed` is called when the state has changed, `redraw` with the names of parts to be drawn again.
@@ -25,7 +25,7 @@ export class Tuning {
     const {q, designs: [a, b]} = setup;
     this.store = new Store({q, place: 'tip/0', motion: 'step', touches: 0, edited: 'a', a, b}, () => {
       this.current = false;
-      this.moved = this.workspace.moved = performance.now();
+      this.workspace.moved = performance.now();
       changed();
       this.ask();
     });
@@ -68,14 +68,11 @@ export class Tuning {
     const {a, b} = this.state, all = Object.values(this.questions);
     if (all.every((question) => !question.busy || !question.next)) this.workspace.look({a, b});
   }
-  /// Notes whether all that is shown is of the state, and how long that took.
+  /// Notes whether all that is shown is of the state.
   noteDrawn() {
     const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
     this.current = kDesigns.every((name) => this.asked[name] && same(this.asked[name].design, this.design(name)) &&
       same(this.asked[name].q, this.state.q) && (this.asked[name].touches || 0) === this.state.touches);
-    if (!this.current || !this.moved) return;
-    this.timing.push(performance.now() - this.moved);
-    this.moved = 0;
   }
 
   /// Sets the damping for the wanted ratio at this posture: the matrix for all modes, or a diagonal with that smallest

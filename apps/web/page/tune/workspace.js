@@ -21,8 +21,7 @@ export class Workspace {
       const key = JSON.stringify(design);
       if (this.asked[name] === key) continue;
       this.asked[name] = key;
-      this.found[name] = {postures: 0, smallest_ratio: [], gain_margin: [], worst: {}, error: '', took: null,
-        began: performance.now()};
+      this.found[name] = {postures: 0, smallest_ratio: [], gain_margin: [], worst: {}, error: ''};
     }
     if (!this.busy) this.run();
   }
@@ -55,7 +54,6 @@ export class Workspace {
       const worst = part.worst[key];
       if (worst && !(found.worst[key]?.value <= worst.value)) found.worst[key] = worst;
     }
-    if (found.postures >= kPostures) found.took = performance.now() - found.began;
   }
 }
 
