@@ -1,7 +1,5 @@
 """Models as people have them: MJCF beside the engine, xacro, doubtful URDFs, files that are saved."""
 
-import functools
-import importlib.util
 import json
 import subprocess
 
@@ -9,7 +7,6 @@ import numpy as np
 import pytest
 
 import dashpot
-import models_sweep
 
 # Two joints in one body, anchors, references, a slide, a turned base, and bodies off the chain.
 MJCF = """
@@ -46,13 +43,46 @@ def odd(mujoco):
     return mujoco.MjModel.from_xml_string(MJCF)
 
 
+def beside_engine(mujoco, model, base, tip, robot):
+    """Largest difference of M, g and J from the engine's, each relative to its largest entry."""
+    data = mujoco.MjData(model)
+    joints = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+              for name in robot.joint_names]
+    dofs, places = model.jnt_dofadr[joints], model.jnt_qposadr[joints]
+    lower, upper = np.maximum(robot.lower, -3), np.minimum(robot.upper, 3)
+    random = np.random.default_rng(1)
+    worst = np.zeros(3)
+    base_id = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, base)
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, tip)
+    place = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, tip) if body < 0 else -1
+    for _ in range(5):
+        q = random.uniform(lower, upper)
+        mujoco.mj_resetData(model, data)
+        data.qpos[places] = q
+        mujoco.mj_forward(model, data)
+        M = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, M)
+        J = np.zeros((6, model.nv))
+        if body >= 0:
+            mujoco.mj_jacBody(model, data, J[:3], J[3:], body)
+        else:
+            mujoco.mj_jacSite(model, data, J[:3], J[3:], place)
+        R = data.xmat[base_id].reshape(3, 3)  # into the world
+        J = np.vstack([R.T @ J[:3], R.T @ J[3:]])[:, dofs]
+        for i, (ours, engine) in enumerate([
+                (robot.mass(q), M[np.ix_(dofs, dofs)]), (robot.gravity(q), data.qfrc_bias[dofs]),
+                (robot.jacobian(q), J)]):
+            worst[i] = max(worst[i], abs(ours - engine).max() / max(1e-9, abs(engine).max(), 1))
+    return worst
+
+
 @pytest.mark.parametrize("tip", ["tip", "tool", "lower"])
 @pytest.mark.parametrize("base", ["base", "upper", "world"])
-def test_an_odd_arm_equals_the_engines(odd, base, tip):
+def test_an_odd_arm_equals_the_engines(mujoco, odd, base, tip):
     robot = dashpot.Robot.from_mujoco(odd, base, tip)
     names = ["one", "two", "three", "four"][2 if base == "upper" else 0:3 if tip == "lower" else 4]
     assert list(robot.joint_names) == names
-    assert max(models_sweep.beside_mujoco(odd, base, tip, robot)) < 1e-12
+    assert max(beside_engine(mujoco, odd, base, tip, robot)) < 1e-12
 
 
 def test_what_an_engine_says_of_joints_is_taken(odd):
@@ -75,7 +105,7 @@ def test_gravity_can_be_off_and_names_can_coincide(mujoco, odd):
     assert not dashpot.Robot.from_mujoco(still, "base", "tool").gravity([0.1] * 4).any()
     named = mujoco.MjModel.from_xml_string(MJCF.replace('name="camera"', 'name="link of one"'))
     robot = dashpot.Robot.from_mujoco(named, "base", "tool")
-    assert max(models_sweep.beside_mujoco(named, "base", "tool", robot)) < 1e-12
+    assert max(beside_engine(mujoco, named, "base", "tool", robot)) < 1e-12
 
 
 def test_positions_are_those_of_the_engine(mujoco, odd):
@@ -143,56 +173,6 @@ def test_a_path_is_as_good_as_a_model(mujoco, odd, tmp_path):
                           dashpot.Robot.from_mujoco(odd, "base", "tip").mass(q))
     with pytest.raises(dashpot.Error, match="is MJCF, MuJoCo's format.*from_mujoco"):
         dashpot.Robot.from_urdf(path, "base", "tip")
-
-
-@functools.cache
-def _rows(sweep):
-    return list(sweep())
-
-
-def _swept(sweep, needed, packages):
-    pytest.importorskip(needed)
-    rows = _rows(sweep)
-    if not rows:
-        pytest.skip(f"{packages} is not installed")
-    read = 0
-    for name, chain, _, found in rows:
-        if isinstance(found, str):
-            assert "refused" in found and ": " in found
-        else:
-            read += 1
-            assert max(found) < 1e-9, (name, chain, found)
-    return read, rows
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_arms_of_robosuite_and_franky_sim_equal_the_engines():
-    read, rows = _swept(models_sweep.sweep_mjcf, "mujoco", "robosuite or franky-sim (PyPI)")
-    assert all(not isinstance(found, str) for *_, found in rows) and read == len(rows)
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_arms_of_example_robot_data_equal_pinocchios():
-    _swept(models_sweep.sweep_urdf, "pinocchio", "example-robot-data (PyPI)")
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_the_table_of_the_documents_is_that_of_the_sweep(root):
-    told = {}
-    for line in (root / "docs/models.md").read_text().splitlines():
-        cells = [cell.strip() for cell in line.split("|")]
-        if len(cells) == 7 and cells[2].isdigit():
-            told[cells[1]] = (int(cells[2]), int(cells[3]))
-    found = {}
-    for sweep, needed in ((models_sweep.sweep_mjcf, "mujoco"), (models_sweep.sweep_urdf, "pinocchio")):
-        if importlib.util.find_spec(needed) is None:
-            continue
-        for name, _, _, numbers in _rows(sweep):
-            chains, read = found.get(name, (0, 0))
-            found[name] = (chains + 1, read + (not isinstance(numbers, str)))
-    if not found:
-        pytest.skip("robosuite, franky-sim and example-robot-data (PyPI) are not installed")
-    assert {name: told.get(name) for name in found} == found
 
 
 XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
