@@ -1,21 +1,23 @@
 // The loop of a host in real time, for as long as one likes, or so many times as fast. A simulated
-// Panda follows goals at 1 kHz under the plugin. Meanwhile the host changes gains, asks for some
-// that are refused, releases faults, and makes a second controller with a publisher and destroys
-// it; states and modes go over LCM and are read again. A line each 10 minutes, or each quarter of a
-// shorter run. The first of these is for warming up; what the last one needs more than the second
-// is a failure, as is a status other than ok, a bound that is lost, a goal that is not reached.
-// Durations are printed and not judged. SIGINT or SIGTERM ends it with the cycle of 4 s.
+// Panda follows goals at 1 kHz under the plugin. Meanwhile another thread changes gains, asks for
+// some that are refused, releases faults, and makes a second controller with a publisher and
+// destroys it; states and modes go over LCM and are read again. A line each 10 minutes, or each
+// quarter of a shorter run. The first of these is for warming up; what the last one needs more than
+// the second is a failure, as is a status other than ok, a bound that is lost, a goal that is not
+// reached. SIGINT or SIGTERM ends it with the cycle of 4 s.
 #include <dashpot/lcmtypes/plugin_publisher.h>
 #include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
+#include <dashpot/sim/arm.hpp>
+#include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/stress/part.hpp>
-#include <dashpot/tests/stress/soak_loop.hpp>
 #include <dashpot/tests/support/places.hpp>
 
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -23,6 +25,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -30,18 +33,22 @@
 
 namespace {
 
-using namespace dashpot::stress;  // NOLINT(google-build-using-namespace)
-using dashpot::modes_t;
-using dashpot::state_t;
-using std::chrono::milliseconds;
+namespace sim = dashpot::sim;
+using dashpot::stress::Request;
+using std::chrono::steady_clock;
 
-// Limits of the growth of an interval over the second one, and of the arm's distance from its goal.
+constexpr std::int64_t kSecond = 1000, kCycle = 4 * kSecond;  // ticks
+constexpr std::int64_t kLost = 20;             // ticks without positions, with which a cycle begins
+constexpr std::int64_t kAct = 200;             // tick of a second in which the other thread begins
 constexpr std::int64_t kMoreMemory = 4 << 20;  // bytes
-constexpr double kMoreError = 5e-4;            // m
+constexpr double kLargestError = 5e-3, kMoreError = 5e-4;  // m
 constexpr auto kUnfinished = static_cast<int>(dashpot::analysis::Status::kUnfinished);
-constexpr double kLargestError = 5e-3;  // m
 
 std::atomic<bool> interrupted{false};
+
+sim::JointVector home() {
+  return (sim::JointVector(7) << 0, -0.785, 0, -2.356, 0, 1.571, 0.785).finished();
+}
 
 struct Destroy {
   void operator()(dashpot_controller* controller) const { dashpot_destroy(controller); }
@@ -51,9 +58,11 @@ struct Destroy {
 /// A controller at rest at its home, with its publisher.
 struct Hosted {
   explicit Hosted(const std::string& url)
-      : controller(
-            dashpot_create_from_text(kSoakConfig, (DASHPOT_SOURCE_DIR "/sim/models").c_str())) {
-    if (!controller || dashpot_start(controller.get(), SoakLoop::home().data(), nullptr) != 0) {
+      : controller(dashpot_create_from_text(
+            "robot: {urdf: panda.urdf, base: panda_link0, tip: panda_hand_tcp}\n"
+            "analysis: {sampled: {interval: 100 ms}}\n",
+            (DASHPOT_SOURCE_DIR "/sim/models").c_str())) {
+    if (!controller || dashpot_start(controller.get(), home().data(), nullptr) != 0) {
       throw std::runtime_error(dashpot_last_error());
     }
     publisher.reset(dashpot_publisher_create(controller.get(), url.c_str()));
@@ -67,15 +76,14 @@ struct Hosted {
 class Listener {
  public:
   explicit Listener(const std::string& url) : reader_(dashpot::lcmtypes::open_bus(url), handlers_) {
-    handlers_.on_state = [this](const state_t&) { ++states; };
-    handlers_.on_modes = [this](const modes_t& message) {
+    handlers_.on_state = [this](const dashpot::state_t&) { ++states; };
+    handlers_.on_modes = [this](const dashpot::modes_t& message) {
       if (message.status == kUnfinished) return;  // another thread goes on with it
       ++modes;
-      const bool bounded =
-          message.status == 0 &&
-          std::all_of(message.eigenvalue_bound.begin(), message.eigenvalue_bound.end(),
-                      [](double bound) { return std::isfinite(bound); });
-      if (!bounded) ++unbounded;
+      const auto& bounds = message.eigenvalue_bound;
+      if (message.status != 0 ||
+          !std::all_of(bounds.begin(), bounds.end(), [](double x) { return std::isfinite(x); }))
+        ++unbounded;
     };
     thread_ = std::thread([this] {
       while (!stop_ && reader_.wait(100)) {
@@ -102,157 +110,79 @@ class Listener {
 /// Resources of the process.
 struct Footprint {
   std::int64_t memory = 0;  ///< resident, bytes
-  std::int64_t descriptors = 0;
-  std::int64_t threads = 0;
+  std::int64_t descriptors = 0, threads = 0;
 };
 
-std::int64_t entries(const char* directory) {
-  const std::filesystem::directory_iterator begin(directory);
-  return std::distance(begin, std::filesystem::directory_iterator());
-}
-
 Footprint footprint() {
+  const auto entries = [](const char* directory) {
+    const std::filesystem::directory_iterator begin(directory);
+    return std::distance(begin, std::filesystem::directory_iterator());
+  };
   std::int64_t size = 0, resident = 0;
   std::ifstream("/proc/self/statm") >> size >> resident;
   return {resident * sysconf(_SC_PAGESIZE), entries("/proc/self/fd") - 1,  // the one that counts
           entries("/proc/self/task")};
 }
 
-/// The work of the thread beside the loop in each second of a cycle. Throws std::runtime_error if
-/// the controller answers otherwise than it should.
-class Operator {
- public:
-  Operator(dashpot_controller* controller, std::string url)
-      : controller_(controller), url_(std::move(url)) {}
+void expect(std::int32_t code, std::int32_t expected, const char* what) {
+  if (code == expected) return;
+  throw std::runtime_error(std::string(what) + " returned " + std::to_string(code) + ": " +
+                           dashpot_last_error());
+}
 
-  void work(std::int64_t second) {
-    switch (second % 4) {
-      case 0:
-        set_gains(400, 0, 0.7, DASHPOT_OK);
-        break;
-      case 1:
-        set_gains(600, 60, 0, DASHPOT_OK);
-        break;
-      case 2:
-        set_gains(1e7, 0, 0, DASHPOT_UNSTABLE_GAINS);
-        break;
-      default:
-        make_another();
-    }
+/// `stiffness` in N/m and `damping` in N s/m; a tenth of the numbers for rotation.
+void set_gains(dashpot_controller* controller, double stiffness, double damping, double ratio,
+               std::int32_t expected) {
+  const Eigen::Matrix<double, 6, 1> shares{{1, 1, 1, 0.1, 0.1, 0.1}};
+  const Eigen::Matrix<double, 6, 6> K = (stiffness * shares).asDiagonal();
+  const Eigen::Matrix<double, 6, 6> C = (damping * shares).asDiagonal();
+  dashpot_gains gains{};
+  gains.struct_size = sizeof gains;
+  gains.joints = 7;
+  gains.task_stiffness = K.data();
+  (ratio > 0 ? gains.task_damping_ratio : gains.task_damping) = ratio > 0 ? &ratio : C.data();
+  expect(dashpot_set_gains(controller, &gains), expected, "dashpot_set_gains");
+}
+
+/// What the other thread does in a second of a cycle. Returns what went wrong, or nothing.
+std::string act(dashpot_controller* controller, const std::string& url, std::int64_t second) try {
+  if (second == 0) {
+    dashpot_release(controller);
+    set_gains(controller, 400, 0, 0.7, DASHPOT_OK);
   }
-
- private:
-  static void expect(std::int32_t code, std::int32_t expected, const char* what) {
-    if (code == expected) return;
-    throw std::runtime_error(std::string(what) + " returned " + std::to_string(code) + ": " +
-                             dashpot_last_error());
-  }
-
-  /// `stiffness` in N/m and `damping` in N s/m; a tenth of the numbers for rotation.
-  void set_gains(double stiffness, double damping, double ratio, std::int32_t expected) {
-    Eigen::Matrix<double, 6, 1> shares;
-    shares << 1, 1, 1, 0.1, 0.1, 0.1;
-    const Eigen::Matrix<double, 6, 6> K = (stiffness * shares).asDiagonal();
-    const Eigen::Matrix<double, 6, 6> C = (damping * shares).asDiagonal();
-    dashpot_gains gains{};
-    gains.struct_size = sizeof gains;
-    gains.joints = 7;
-    gains.task_stiffness = K.data();
-    if (ratio > 0) {
-      gains.task_damping_ratio = &ratio;
-    } else {
-      gains.task_damping = C.data();
-    }
-    expect(dashpot_set_gains(controller_, &gains), expected, "dashpot_set_gains");
-  }
-
-  void make_another() {
-    const Hosted other(url_);
-    const dashpot::sim::JointVector q = SoakLoop::home();
+  if (second == 1) set_gains(controller, 600, 60, 0, DASHPOT_OK);
+  if (second == 2) set_gains(controller, 1e7, 0, 0, DASHPOT_UNSTABLE_GAINS);
+  if (second == 3) {
+    const Hosted other(url);
     dashpot_modes modes{};
     modes.struct_size = sizeof modes;
-    expect(dashpot_analyze(other.controller.get(), q.data(), DASHPOT_MODE_CARTESIAN, nullptr,
+    expect(dashpot_analyze(other.controller.get(), home().data(), DASHPOT_MODE_CARTESIAN, nullptr,
                            nullptr, &modes),
            DASHPOT_OK, "dashpot_analyze");
   }
+  return "";
+} catch (const std::exception& error) {
+  return error.what();
+}
 
-  dashpot_controller* controller_;
-  std::string url_;
+struct Goal {
+  sim::JointVector position;
+  sim::Pose tip;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rotation;
 };
 
-/// Prints the intervals, and judges them.
-class Judge {
- public:
-  bool good() const { return good_; }
-
-  void print_header() const {
-    std::printf("%52s%42s\n", "tick, us", "wake-up late, us");
-    std::printf("%8s%10s", "s", "ticks");
-    for (int i = 0; i < 2; ++i) {
-      std::printf("%9s%8s%8s%8s%9s", "50 %", "99 %", "99.9 %", "99.99 %", "max");
+std::array<Goal, 4> goals_of(sim::Arm& arm) {
+  std::array<Goal, 4> goals;
+  for (std::size_t i = 0; i < goals.size(); ++i) {
+    sim::JointVector& q = goals[i].position = home();
+    for (Eigen::Index j = 0; j < q.size(); ++j) {
+      q[j] += 0.05 * std::sin(static_cast<double>(j) + 1.5 * static_cast<double>(i));
     }
-    std::printf("%7s%9s%5s%8s%8s%8s%9s\n", "missed", "MB", "fd", "threads", "tip, um", "modes",
-                "bounded");
+    goals[i].tip = arm.tip_pose(q);
+    goals[i].rotation = goals[i].tip.rotation;
   }
-
-  void take(const LoopInterval& loop, const Footprint& held, const Listener& listener) {
-    ticks_ += loop.ticks;
-    const std::int64_t states = listener.states - states_, modes = listener.modes - modes_;
-    const std::int64_t unbounded = listener.unbounded - unbounded_;
-    states_ += states, modes_ += modes, unbounded_ += unbounded;
-    std::printf("%8.0f%10ld", 1e-3 * static_cast<double>(ticks_), loop.ticks);
-    print(loop.tick);
-    print(loop.late);
-    std::printf("%7ld%9.2f%5ld%8ld%8.1f%8ld%9ld\n", loop.missed,
-                1e-6 * static_cast<double>(held.memory), held.descriptors, held.threads,
-                1e6 * loop.tip_error, modes, modes - unbounded);
-    if (!loop.simulated) fail("the simulation failed");
-    if (loop.unasked > 0) {
-      fail(std::to_string(loop.unasked) +
-           " ticks were not ok, the last: " + dashpot_status_text(loop.status));
-    }
-    if (loop.tip_error > kLargestError) fail("the arm does not reach its goals");
-    if (unbounded > 0) fail("modes have lost their bound");
-    if (states == 0 || modes == 0) fail("nothing comes over the bus");
-    if (loop.number == 2) first_ = held, first_error_ = loop.tip_error;
-    last_ = held, last_error_ = loop.tip_error;
-    intervals_ = loop.number;
-    std::fflush(stdout);
-  }
-
-  void finish() {
-    if (intervals_ < 3) {
-      std::printf("too short to compare its beginning with its end\n");
-      return;
-    }
-    std::printf("since the second line: %+.2f MB, %+ld descriptors, %+ld threads, %+.2f um\n",
-                1e-6 * static_cast<double>(last_.memory - first_.memory),
-                last_.descriptors - first_.descriptors, last_.threads - first_.threads,
-                1e6 * (last_error_ - first_error_));
-    if (last_.memory > first_.memory + kMoreMemory) fail("memory grew");
-    if (last_.descriptors > first_.descriptors) fail("descriptors grew");
-    if (last_.threads > first_.threads) fail("threads grew");
-    if (last_error_ > first_error_ + kMoreError) fail("the arm drifts away from its goals");
-  }
-
-  void fail(const std::string& what) {
-    std::printf("FAILED: %s\n", what.c_str());
-    good_ = false;
-  }
-
- private:
-  static void print(const LogHistogram& durations) {
-    const auto us = [](std::int64_t duration) { return 1e-3 * static_cast<double>(duration); };
-    std::printf("%9.1f%8.1f%8.1f%8.1f%9.1f", us(durations.quantile(0.5)),
-                us(durations.quantile(0.99)), us(durations.quantile(0.999)),
-                us(durations.quantile(0.9999)), us(durations.largest()));
-  }
-
-  bool good_ = true;
-  std::int64_t ticks_ = 0, states_ = 0, modes_ = 0, unbounded_ = 0, intervals_ = 0;
-  Footprint first_, last_;  // of the second interval and of the last
-  double first_error_ = 0, last_error_ = 0;
-};
+  return goals;
+}
 
 bool soak(const Request& request) {
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = true; });
@@ -260,41 +190,96 @@ bool soak(const Request& request) {
   const std::string url =
       "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
   const auto cycles = std::max<std::int64_t>(4, std::llround(request.count * kSecond / kCycle));
+  const std::int64_t interval = std::min<std::int64_t>(cycles / 4, 150) * kCycle;
   Listener listener(url);
   const Hosted hosted(url);
-  SoakLoop loop(hosted.controller.get(), std::llround(1e6 / request.times), cycles,
-                std::min<std::int64_t>(cycles / 4, 150));
-  Operator operator_thread(hosted.controller.get(), url);
-  Judge judge;
-  loop.start();
-  std::int64_t second = -1;
-  judge.print_header();
-  for (bool done = false; !done;) {
-    done = loop.done();  // what it has handed over is fetched below
-    if (interrupted) loop.stop();
-    if (loop.take_release()) dashpot_release(hosted.controller.get());
-    if (const std::int64_t now = loop.ticks() / kSecond; now > second) {
-      try {
-        operator_thread.work(second = now);
-      } catch (const std::runtime_error& error) {
-        judge.fail(error.what());
-      }
+  sim::Arm arm(sim::Robot::from_file(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf", "panda_link0",
+                                     "panda_hand_tcp"));
+  const std::array<Goal, 4> goals = goals_of(arm);
+  sim::PlantOptions options;
+  sim::JointVector torque = options.initial_torque = sim::JointVector::Zero(7);
+  sim::Plant plant(arm, options, home());
+
+  bool good = true, fault = false;
+  const auto check = [&good](bool well, const std::string& what) {
+    if (!well) std::printf("FAILED: %s\n", what.c_str());
+    good = good && well;
+  };
+  std::string said;  // by the other thread
+  std::thread other;
+  Footprint first, last;  // of the second interval and of the last
+  double error = 0, first_error = 0, longest = 0;
+  std::printf("%8s%9s%5s%8s%9s%8s%9s%13s\n", "s", "MB", "fd", "threads", "tip, um", "states",
+              "modes", "longest, us");
+  const std::chrono::nanoseconds period(std::llround(1e6 / request.times));
+  auto deadline = steady_clock::now();
+  for (std::int64_t k = 0; k < cycles * kCycle && good && !(interrupted && k % kCycle == 0); ++k) {
+    std::this_thread::sleep_until(deadline += period);
+    const auto begin = steady_clock::now();
+    if (begin > deadline + period) deadline = begin;
+    const std::int64_t second = k / kSecond % 4, rest = k % kSecond;
+    // The arm goes to another goal each second, two in joint space and two in Cartesian space.
+    const Goal& goal = goals[static_cast<std::size_t>(second)];
+    const sim::Measurement& measured = plant.measured();
+    sim::JointVector position = measured.position;
+    if (second == 0 && k >= kCycle && rest < kLost) {
+      fault = true;
+      position.setConstant(std::numeric_limits<double>::quiet_NaN());
     }
-    if (loop.fetch()) judge.take(loop.interval(), footprint(), listener);
-    std::this_thread::sleep_for(milliseconds(2));
+    if (rest == kAct) {
+      other = std::thread([&, second] { said = act(hosted.controller.get(), url, second); });
+    }
+    const dashpot_state state = {
+        sizeof state, 7, measured.time, position.data(), measured.velocity.data(), nullptr};
+    const dashpot_setpoint setpoint = {
+        sizeof setpoint,      7,
+        measured.time,        second < 2 ? DASHPOT_MODE_JOINT : DASHPOT_MODE_CARTESIAN,
+        goal.position.data(), goal.tip.position.data(),
+        goal.rotation.data(), nullptr};
+    dashpot_output output = {sizeof output, 7, torque.data()};
+    const std::int32_t status = dashpot_update(hosted.controller.get(), &state,
+                                               rest % 100 == 0 ? &setpoint : nullptr, &output);
+    const std::chrono::duration<double, std::micro> duration = steady_clock::now() - begin;
+    longest = std::max(longest, duration.count());
+    if (rest > kAct && status == DASHPOT_OK) fault = false;
+    check(status == DASHPOT_OK || (fault && status > 0 && k % kCycle < kSecond + kAct),
+          std::string("a tick was not ok: ") + dashpot_status_text(status));
+    check(plant.step(torque) == sim::Status::kOk, "the simulation failed");
+    if (rest < kSecond - 1) continue;
+    if (second % 2 == 1) {  // the other seconds begin with another mode
+      error = std::max(error, (arm.tip_pose(plant.position()).position - goal.tip.position).norm());
+    }
+    other.join();
+    check(said.empty(), said);
+    if ((k + 1) % interval != 0) continue;
+    last = footprint();
+    std::printf("%8.0f%9.2f%5ld%8ld%9.1f%8ld%9ld%13.1f\n", 1e-3 * static_cast<double>(k + 1),
+                1e-6 * static_cast<double>(last.memory), last.descriptors, last.threads,
+                1e6 * error, listener.states.exchange(0), listener.modes.load(), longest);
+    std::fflush(stdout);
+    check(error < kLargestError, "the arm does not reach its goals");
+    check(listener.unbounded == 0, "modes have lost their bound");
+    check(listener.modes.exchange(0) > 0, "nothing comes over the bus");
+    if ((k + 1) / interval == 2) first = last, first_error = error;
+    if ((k + 1) / interval > 2) {
+      check(last.memory <= first.memory + kMoreMemory, "memory grew");
+      check(last.descriptors <= first.descriptors, "descriptors grew");
+      check(last.threads <= first.threads, "threads grew");
+      check(error <= first_error + kMoreError, "the arm drifts away from its goals");
+    }
+    error = longest = 0;
   }
-  judge.finish();
-  std::printf("%sscheduled ahead of others\n", loop.scheduled() ? "" : "not ");
-  return judge.good();
+  if (other.joinable()) other.join();
+  return good;
 }
 
-const AddPart part({"soak",
-                    0,
-                    "Run the loop of a host in real time, or so many times as fast: durations, "
-                    "memory, descriptors and threads; SIGINT ends it early",
-                    "SECONDS",
-                    {{60, 16}},
-                    soak,
-                    {"TIMES"}});
+const dashpot::stress::AddPart part({"soak",
+                                     0,
+                                     "Run the loop of a host in real time, or so many times as "
+                                     "fast: memory, descriptors and threads; SIGINT ends it early",
+                                     "SECONDS",
+                                     {{60, 16}},
+                                     soak,
+                                     {"TIMES"}});
 
 }  // namespace
