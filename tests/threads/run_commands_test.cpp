@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 namespace dashpot::tests {
 namespace {
 
@@ -163,6 +165,29 @@ TEST(RunWithCommands, IsReleasedFromAFaultThatIsNamed) {
   const Json result = live.end();
   EXPECT_GE(result["faults"].get<int>(), 1);
   EXPECT_EQ(result["fault"], nullptr);
+}
+
+/// A scenario's tip targets refer to the configuration's T, also after commands have changed T.
+TEST(RunWithCommands, GoesWhereTheScenarioWantsTheTipLinkWithAnotherTool) {
+  const Scratch scratch;
+  const std::string file =
+      patient_scene(scratch, "tip_displacement: [0, 2 cm, 0, 0, 0, 0]",
+                    "tip_displacement: [0, 0, 0, 0, 0, 0]\n  steps:\n    - at: 2 s\n      "
+                    "tip_displacement: [0, 3 cm, 0, 0, 0, 0]");
+  LiveRun live(file);
+  if (!live.heard()) GTEST_SKIP() << kNoMulticast;
+  const state_t start = live.state;
+  command_t command = joint_command(start, 0, 1);
+  command.parts = command_t::TOOL_FRAME;
+  command.tool_position[2] = 0.1;
+  command.tool_quaternion[0] = 1;
+  live.publish(command);
+  ASSERT_TRUE(live.until([&] { return live.state.tool_position[2] == 0.1; }));
+  const auto y = [&] { return live.state.reference_tip_position[1] - start.tip_position[1]; };
+  EXPECT_TRUE(live.until([&] { return std::abs(y() - 0.03) < 1e-9; })) << y();
+  // The tool points downward, as far as the tip link does.
+  EXPECT_NEAR(live.state.reference_tip_position[2], start.tip_position[2] - 0.1, 1e-4);
+  live.end();
 }
 
 }  // namespace
