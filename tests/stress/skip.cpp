@@ -1,11 +1,9 @@
-// Leaves out what a system, a tick or a scene does not need, beside the same with all of it, and
-// compares the numbers, over all families of tests/support/tracker_paths.hpp and all arms.
+// Leaves out what a tick or a scene does not need, beside the same with all of it, and compares the
+// numbers, of all arms. Spectra are compared with what Arb proves (certified_referee_test).
 #include <dashpot/tests/stress/part.hpp>
-#include <dashpot/tests/stress/paths.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/controller_skips.hpp>
 #include <dashpot/tests/support/plant_skips.hpp>
-#include <dashpot/tests/support/spectrum_skips.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -21,37 +19,6 @@ bool print(const SkipTally& tally) {
   std::printf("  %-44s %9ld %10ld  %8.2g  %s\n", tally.what.c_str(), tally.left_out, tally.compared,
               tally.largest, verdict);
   return tally.good();
-}
-
-bool spectra(long steps, std::uint64_t seed) {
-  constexpr int kApart = 10;  // of the systems that are solved
-  TrackerSkips tracked;
-  SolverSkips solved;
-  std::vector<const SkipTally*> tallies;
-  bool good = true;
-  for (const PathFamily& family : path_families()) {
-    follow_paths(family, seed, steps_of_each(steps),
-                 [&](const SystemPath& path, std::uint64_t path_seed, int length) {
-                   tracked.start();
-                   for (int k = 0; k < length; ++k) {
-                     const auto system = path(static_cast<double>(k) / (kStepsOfAPath - 1));
-                     tracked.step(system);
-                     if (k % kApart == 0) solved.see(system);
-                   }
-                   tallies.clear();
-                   for (const SkipTally* tally : tracked.tallies()) tallies.push_back(tally);
-                   for (const SkipTally* tally : solved.tallies()) tallies.push_back(tally);
-                   const bool now = std::all_of(tallies.begin(), tallies.end(),
-                                                [](auto* tally) { return tally->outside == 0; });
-                   if (good && !now) {
-                     std::printf("  the first that differs: %s, seed %lu\n", family.name.c_str(),
-                                 path_seed);
-                   }
-                   good &= now;
-                 });
-  }
-  for (const SkipTally* tally : tallies) good &= print(*tally);
-  return good;
 }
 
 bool ticks(long steps, std::uint64_t seed) {
@@ -92,8 +59,7 @@ bool compare_all(const Request& request) {
       "proved bounds, of torques and motions rounding errors, or nothing at all.\n"
       "  %-44s %9s %10s  %8s\n",
       request.seed, "left out", "times", "numbers", "largest");
-  bool good = spectra(steps, request.seed);
-  good &= ticks(steps, request.seed);
+  bool good = ticks(steps, request.seed);
   good &= simulations(std::max(1L, steps / 10'000), request.seed);
   return good;
 }

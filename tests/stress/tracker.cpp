@@ -2,17 +2,17 @@
 // checks every published bound against eigenvalues in long double; errors near their bound, and
 // every hundredth step, also against eigenvalues that FLINT/Arb proves.
 #include <dashpot/tests/stress/part.hpp>
-#include <dashpot/tests/stress/paths.hpp>
 #include <dashpot/tests/support/enclosure.hpp>
 #include <dashpot/tests/support/proved_eigenvalues.hpp>
+#include <dashpot/tests/support/tracker_paths.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
 namespace {
 
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
-using dashpot::stress::kStepsOfAPath;
 using dashpot::testing::judge;
 using dashpot::testing::judge_against;
 using dashpot::testing::PathFamily;
@@ -20,6 +20,7 @@ using dashpot::testing::proved_eigenvalues;
 using dashpot::testing::SystemPath;
 using dashpot::testing::Verdict;
 
+constexpr long kStepsOfAPath = 200;
 constexpr long kApart = 100;  ///< of the checks by Arb
 
 struct Tally {
@@ -95,7 +96,8 @@ void print(const std::string& name, const Tally& t) {
 }
 
 bool follow_all(const dashpot::stress::Request& request) {
-  const long each = dashpot::stress::steps_of_each(request.whole());
+  const auto families = static_cast<long>(dashpot::testing::path_families().size());
+  const long each = (request.whole() + families - 1) / families;
   std::printf("Seed %lu. `digits`: steps judged by FLINT/Arb; the rest in long double.\n",
               request.seed);
   std::printf("%-17s %7s %6s %7s %6s %6s %6s | %5s | %8s %8s\n", "family", "steps", "digits",
@@ -103,10 +105,12 @@ bool follow_all(const dashpot::stress::Request& request) {
   Tally all;
   for (const PathFamily& family : dashpot::testing::path_families()) {
     Tally tally;
-    dashpot::stress::follow_paths(family, request.seed, each,
-                                  [&](const SystemPath& path, std::uint64_t seed, int steps) {
-                                    follow(family, path, seed, steps, tally);
-                                  });
+    std::uint64_t seed = 1'000'003 * request.seed;
+    for (long left = each; left > 0; left -= kStepsOfAPath, ++seed) {
+      dashpot::testing::Dice dice(seed);
+      follow(family, family.make(dice), seed, static_cast<int>(std::min(left, kStepsOfAPath)),
+             tally);
+    }
     print(family.name, tally);
     add(tally, all);
   }

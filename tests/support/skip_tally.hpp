@@ -47,7 +47,7 @@ struct SkipTally {
   }
 };
 
-/// The modes of a spectrum as they can be compared: of ModeNumbers, Mode or VibrationMode.
+/// The modes of a spectrum as they can be compared: of Mode or VibrationMode.
 struct PlainMode {
   std::array<analysis::Complex, 2> eigenvalues;
   double error_bound, natural_frequency, natural_frequency_bound, damping_ratio,
@@ -63,10 +63,6 @@ struct PlainMode {
         damping_ratio_bound(mode.damping_ratio_bound) {}
 };
 using PlainModes = std::vector<PlainMode>;
-
-inline PlainModes plain_modes(const analysis::TrackedSpectrum& spectrum) {
-  return {spectrum.modes.begin(), spectrum.modes.begin() + spectrum.mode_count};
-}
 
 /// Fails unless the same places have the same bits.
 inline void compare_bits(const PlainModes& with, const PlainModes& without, SkipTally& tally) {
