@@ -205,6 +205,69 @@ TEST(Plant, GivesTheSameBitsTwice) {
   EXPECT_NE(closed_loop(everything(3), {}), closed_loop(everything(4), {}));
 }
 
+/// What a simulation leaves out because the scene has none of it, beside a scene that has it
+/// without effect. 1e-11 is rounding of a hundred periods; Rosenbrock's method differentiates
+/// numerically.
+TEST(Plant, LeavesOutNothingThatMatters) {
+  struct Scene {
+    RobotParameters parameters;
+    ArmOptions arm;
+    PlantOptions plant;
+  };
+  struct Part {
+    const char* what;
+    double allowed;
+    void (*add)(Scene&);
+  };
+  const Part parts[] = {
+      {"viscous", 1e-11, [](Scene& s) { s.parameters.viscous_friction.setConstant(7, 1e-18); }},
+      {"Coulomb", 1e-11, [](Scene& s) { s.parameters.coulomb_friction.setConstant(7, 1e-18); }},
+      {"stops", 0,
+       [](Scene& s) {
+         s.arm.stops = Contact{2000, 20};
+       }},
+      {"wall", 0, [](Scene& s) { s.arm.wall.emplace().point.z() = -10; }},
+      {"wrench", 1e-11,
+       [](Scene& s) {
+         s.arm.wrenches = {{0, 1e9, 1e-18 * Vector6::Ones()}};
+       }},
+      {"limit", 0,
+       [](Scene& s) {
+         s.plant.torque_limit.setConstant(7, std::numeric_limits<double>::infinity());
+       }},
+      {"low-pass", 1e-11, [](Scene& s) { s.plant.torque_cutoff = 1e9; }},
+      {"noise", 1e-15, [](Scene& s) { s.plant.position_noise.setConstant(7, 1e-18); }},
+      {"noise of rates", 1e-15, [](Scene& s) { s.plant.velocity_noise.setConstant(7, 1e-18); }},
+      {"counts", 1e-15, [](Scene& s) { s.plant.position_resolution.setConstant(7, 0x1p-52); }}};
+  const JointVector q{{0.2, -0.6, -0.1, -2.2, 0.3, 1.4, 0.6}};
+  for (const Method method : testing::kMethods) {
+    Scene lean;
+    lean.parameters.viscous_friction = lean.parameters.coulomb_friction = JointVector::Zero(7);
+    lean.plant.integrator.method = method;
+    const auto moved = [&q](const Scene& scene) {
+      Arm arm(testing::robot_of(testing::panda_file(), scene.parameters), scene.arm);
+      Plant plant(arm, scene.plant, q);
+      Eigen::VectorXd seen(14);
+      for (int k = 0; k < 100; ++k) {  // within the joints' limits
+        const JointVector phase = JointVector::LinSpaced(7, 0.01 * k, 0.01 * k + 6);
+        const JointVector size{{10, 10, 10, 10, 0.1, 0.1, 0.1}};
+        EXPECT_EQ(plant.step(size.cwiseProduct(JointVector(phase.array().sin()))), Status::kOk);
+      }
+      seen << plant.measured().position, plant.measured().velocity;
+      return seen;
+    };
+    const Eigen::VectorXd without = moved(lean);
+    for (const Part& part : parts) {
+      Scene full = lean;
+      part.add(full);
+      const double allowed =
+          method == Method::kRosenbrock && part.allowed == 1e-11 ? 1e-8 : part.allowed;
+      EXPECT_LE((moved(full) - without).cwiseAbs().maxCoeff(), allowed)
+          << part.what << ", " << name_of(method);
+    }
+  }
+}
+
 // --------------------------------------------------------------------------------------- failures
 
 TEST(Plant, RefusesBadCommandsAndStaysWhereItIs) {
