@@ -293,31 +293,6 @@ TEST(Law, SumsTheModesByTheirWeights) {
   }
 }
 
-TEST(ClosedLoop, RateAndGeometricStiffnessAreDerivatives) {
-  Random random(325);
-  for (int k = 0; k < 20; ++k) {
-    const RobotModel model = rough_chain(random, 7);
-    const JointVector q = random.vector(7), qd = random.vector(7);
-    const DynamicsKernel kernel(model);
-    const auto jacobian = [&](const JointVector& at) {
-      DynamicsResult robot;
-      kernel.evaluate(at, qd, robot);
-      return robot.J;
-    };
-    constexpr double kStep = 1e-5;
-    const Jacobian J = jacobian(q);
-    const MatrixXd rate = (jacobian(q + kStep * qd) - jacobian(q - kStep * qd)) / (2 * kStep);
-    EXPECT_TRUE(near(jacobian_rate(J, qd), rate, 1e-7));
-    const Vector6 f = random.vector(6);
-    MatrixXd K_G(7, 7);
-    for (int i = 0; i < 7; ++i) {
-      const JointVector d = kStep * JointVector::Unit(7, i);
-      K_G.col(i) = (jacobian(q + d) - jacobian(q - d)).transpose() * f / (2 * kStep);
-    }
-    EXPECT_TRUE(near(geometric_stiffness(J, f), K_G, 1e-7));
-  }
-}
-
 TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
   Random random(326);
   Case one(rough_chain(random, 7), random);
