@@ -7,6 +7,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import zipfile
 
 
 def output(*command):
@@ -19,18 +20,25 @@ def package(name, version, **more):
             "licenseDeclared": "NOASSERTION", **more}
 
 
-def libraries(folder):
-    """Returns the Debian packages that those in a folder depend on, with the versions of this machine."""
-    names = set()
-    for path in folder.glob("*.deb"):
-        depends = output("dpkg-deb", "--field", str(path), "Depends")
-        names |= {re.split(r"[ (|]", part.strip())[0] for part in depends.split(",")}
-    names = {name for name in names if name and "dashpot" not in name}
+def libraries(path):
+    """Returns the names of the Debian packages on which one depends, or whose libraries a wheel contains."""
+    if path.suffix == ".whl":  # ./run python puts their licences there
+        parts = [name.rpartition("/") for name in zipfile.ZipFile(path).namelist()]
+        return {name for folder, _, name in parts if folder.endswith("/licenses/bundled")}
+    if path.suffix != ".deb":
+        return set()
+    depends = output("dpkg-deb", "--field", str(path), "Depends").split(",")
+    names = {re.split(r"[ (|]", part.strip())[0] for part in depends}
+    return {name for name in names if name and "dashpot" not in name}
+
+
+def versions(names):
+    """Returns Debian packages with the versions of this machine."""
     lines = output("dpkg-query", "-W", "-f", "${Package} ${Version}\n", *sorted(names)) if names else ""
-    return [package(name, version, externalRefs=[{
+    return {name: package(name, version, externalRefs=[{
         "referenceCategory": "PACKAGE-MANAGER", "referenceType": "purl",
         "referenceLocator": f"pkg:deb/debian/{name}@{version}"}])
-        for name, version in (line.split() for line in lines.splitlines())]
+        for name, version in (line.split() for line in lines.splitlines())}
 
 
 def main():
@@ -39,10 +47,11 @@ def main():
                      checksums=[{"algorithm": "SHA256",
                                  "checksumValue": hashlib.sha256(path.read_bytes()).hexdigest()}])
              for path in sorted(folder.iterdir())]
-    needed = libraries(folder)
+    needed = {file["name"]: libraries(folder / file["name"]) for file in files}
+    known = versions(set().union(*needed.values()))
     relations = [("SPDXRef-DOCUMENT", "DESCRIBES", file) for file in files]
-    relations += [(file["SPDXID"], "DEPENDS_ON", library) for file in files
-                  if file["name"].endswith(".deb") for library in needed]
+    relations += [(file["SPDXID"], "CONTAINS" if file["name"].endswith(".whl") else "DEPENDS_ON", known[name])
+                  for file in files for name in sorted(needed[file["name"]])]
     json.dump({
         "spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT",
         "name": f"dashpot-{version}",
@@ -50,7 +59,7 @@ def main():
                              + hashlib.sha256(json.dumps(files).encode()).hexdigest()[:16],
         "creationInfo": {"created": datetime.datetime.now(datetime.timezone.utc)
                          .strftime("%Y-%m-%dT%H:%M:%SZ"), "creators": ["Tool: dashpot-sbom"]},
-        "packages": files + needed,
+        "packages": files + list(known.values()),
         "relationships": [{"spdxElementId": one, "relationshipType": kind,
                            "relatedSpdxElement": other["SPDXID"]} for one, kind, other in relations],
     }, sys.stdout, indent=2)
