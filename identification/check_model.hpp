@@ -73,8 +73,8 @@ struct ModelCheck {
   int parameters = 0, rank = 0;
   double condition = 0;
   /// For offset, Coulomb and viscous friction of each joint (3 n), the payload's mass, first moment
-  /// (3) and inertia (6: xx, yy, zz, xy, xz, yz) about the tip link's origin, reflected inertias (n)
-  /// and the delay.
+  /// (3) and inertia (6: xx, yy, zz, xy, xz, yz) about the tip link's origin, reflected inertias
+  /// (n) and the delay.
   Eigen::MatrixXd covariance;
   controller::Attachment attachment;  ///< the description's, with the payload that was found
 };

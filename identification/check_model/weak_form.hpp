@@ -41,7 +41,8 @@ class WeakForm {
   /// qd, with s = -1, 0 or 1, straight between -v0 and v0.
   Eigen::MatrixXd sign(const Eigen::VectorXd& v0) const;
   Eigen::MatrixXd velocity() const;
-  /// Returns integral f sign(qd) exp(-(qd / v0)^2): friction that is larger at low speed (Stribeck).
+  /// Returns integral f sign(qd) exp(-(qd / v0)^2): friction that is larger at low speed
+  /// (Stribeck).
   Eigen::MatrixXd slow_sign(double v0) const;
 
   /// The share of each window in which a joint is slower than v0, n x K.
