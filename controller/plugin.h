@@ -113,6 +113,12 @@ enum {
 enum { DASHPOT_MODE_JOINT = 0, DASHPOT_MODE_CARTESIAN = 1 };
 /* The axes in which the gains of the task are given: B's or T's. */
 enum { DASHPOT_FRAME_BASE = 0, DASHPOT_FRAME_TOOL = 1 };
+enum {
+  DASHPOT_PROJECTOR_DYNAMIC = 0,
+  DASHPOT_PROJECTOR_KINEMATIC = 1,
+  DASHPOT_PROJECTOR_WEIGHTED = 2,
+  DASHPOT_PROJECTOR_NONE = 3
+};
 
 /* How a mode moves; docs/concepts.md has the terms. */
 enum {
@@ -191,6 +197,7 @@ typedef struct dashpot_gains {
                                         the joint mode */
   const double* null_damping_ratio;  /* 1, from 0 to 2: the same for null_damping and the motions
                                         that the task leaves free, with null_stiffness */
+  const int32_t* null_projector;     /* DASHPOT_PROJECTOR_..., through which these act */
 } dashpot_gains;
 
 /* What the arm carries, in the axes of the tip link, and its tool. */

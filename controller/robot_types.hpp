@@ -138,6 +138,7 @@ struct Gains {
   /// only if null_stiffness is zero. 0: null_damping acts. With NullProjector::kNone and a
   /// task_damping_ratio, all springs together have the task's ratio.
   double null_damping_ratio = 0;
+  NullProjector null_projector = NullProjector::kDynamic;  ///< of the null space's springs, dampers
 };
 
 /// The user's command. It may change at any tick; the controller moves there smoothly. A set-point

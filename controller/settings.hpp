@@ -201,7 +201,6 @@ struct Settings {
   Integral integral;
   Energy energy;
   TaskTerms task_terms;
-  NullProjector null_projector = NullProjector::kDynamic;
   JointVector null_weights;  ///< W of NullProjector::kWeighted, n, positive
   Environment environment;
   /// Whether the joints' viscous friction in the model is subtracted from damping that is designed

@@ -48,7 +48,7 @@ void take_preset(const std::string& name, int n, AuditOptions& audit,
   audit.inertia_blocks = preset.inertia_blocks;
   audit.gains.null_stiffness.setConstant(n, preset.null_space);
   audit.gains.null_damping.setConstant(n, kPresetFactor * std::sqrt(preset.null_space));
-  audit.null_projector = controller::NullProjector::kKinematic;
+  audit.gains.null_projector = controller::NullProjector::kKinematic;
   if (preset.joints == nullptr) {
     if (!factor) factor = kPresetFactor;
     return;
@@ -62,7 +62,7 @@ void take_preset(const std::string& name, int n, AuditOptions& audit,
   audit.gains.task_damping = controller::Vector6{t, t, t, r, r, r}.asDiagonal();
   audit.gains.null_stiffness = Eigen::Map<const Eigen::VectorXd>(joints.stiffness.data(), n);
   audit.gains.null_damping = Eigen::Map<const Eigen::VectorXd>(joints.damping.data(), n);
-  audit.null_projector = controller::NullProjector::kNone;
+  audit.gains.null_projector = controller::NullProjector::kNone;
 }
 
 /// Sets the gains of a configuration file.
@@ -71,7 +71,7 @@ void read_gains_file(const std::string& path, const RobotModel& model, AuditOpti
   const text::YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("gains")) throw InputError("gains", "missing");
   audit.gains = controller::read_gains(root, model);
-  read_null_projector(root, model, audit.null_projector, audit.null_weights);
+  read_null_projector(root, model, audit.gains.null_projector, audit.null_weights);
 } catch (const InputError& error) {
   throw error.in_file(path);
 }

@@ -234,7 +234,7 @@ void take_null_space(const ArmOptions& options, const RobotModel& model,
   };
   take("--null-stiffness", options.null_stiffness, "N m/rad", "N/m", gains.null_stiffness);
   take("--null-damping", options.null_damping, "N m s/rad", "N s/m", gains.null_damping);
-  options.projector.take(model, stated.null_projector, stated.null_weights);
+  options.projector.take(model, gains.null_projector, stated.null_weights);
 }
 
 void add_loop_options(CLI::App& command, controller::LoopTiming& timing) {

@@ -118,7 +118,8 @@ class PluginController : public LoopController {
           joint_damping(from.joint_damping),
           task_stiffness(from.task_stiffness),
           task_damping(from.task_damping),
-          frame(from.frame == controller::Frame::kTool ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE) {
+          frame(from.frame == controller::Frame::kTool ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE),
+          projector(static_cast<std::int32_t>(from.null_projector)) {
       for (std::size_t i = 0; i < 6; ++i) directions[i] = from.directions[i] ? 1 : 0;
     }
     dashpot_gains gains(std::uint32_t n) const noexcept {
@@ -134,12 +135,13 @@ class PluginController : public LoopController {
               &frame,
               directions.data(),
               &given.joint_damping_ratio,
-              &given.null_damping_ratio};
+              &given.null_damping_ratio,
+              &projector};
     }
 
     const controller::Gains& given;
     RowMajor joint_stiffness, joint_damping, task_stiffness, task_damping;
-    std::int32_t frame;
+    std::int32_t frame, projector;
     std::array<std::uint8_t, 6> directions{};
   };
 

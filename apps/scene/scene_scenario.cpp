@@ -232,8 +232,9 @@ controller::Setpoint first_setpoint(const Scene& scene) {
 }
 
 void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 7> kKeys = {
-      "at", "mode", "joint_position", "tip_displacement", "wrench", "gains", "payload"};
+  static constexpr std::array<std::string_view, 8> kKeys = {
+      "at",     "mode",  "joint_position", "tip_displacement",
+      "wrench", "gains", "null_projector", "payload"};
   static constexpr std::array<std::string_view, 3> kPayload = {"mass", "center", "inertia"};
   static constexpr std::array<std::pair<std::string_view, controller::Mode>, 2> kModes = {
       {{"joint", controller::Mode::kJoint}, {"cartesian", controller::Mode::kCartesian}}};
@@ -261,6 +262,7 @@ void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scen
     }
     read_numbers(keys, "wrench", kWrenchUnits, kAnyNumber, setpoint.wrench);
     controller::read_gains(keys, model, controller::GainPairs::kEither, setpoint.gains);
+    read_choice(keys, "null_projector", controller::kNullProjectors, setpoint.gains.null_projector);
     if (keys.has("payload")) {
       controller::Payload& payload = step.payload.emplace();
       read_body(keys.mapping("payload", kPayload), payload.mass, payload.center, payload.inertia);

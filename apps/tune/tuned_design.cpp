@@ -113,7 +113,6 @@ controller::Settings settings_of(const TunedArm& arm, const controller::AuditOpt
       std::min(settings.motion.smoothing, controller::kMostSmoothing * settings.period);
   settings.limits.gain_margin = stated.margin;
   settings.initial.mode = stated.mode;
-  settings.null_projector = stated.null_projector;
   settings.null_weights = stated.null_weights;
   controller::Gains gains = stated.gains;
   if (stated.half_quaternion) gains.task_stiffness.bottomRightCorner<3, 3>() *= 0.5;
@@ -231,7 +230,7 @@ TunedDesign read_design(const TunedArm& arm, const Json& design) {
               stated.mode);
   read_choice(keys, "rotation", Choices<bool>{{{"vector", false}, {"half-quaternion", true}}},
               stated.half_quaternion);
-  read_choice(keys, "null_projector", controller::kNullProjectors, stated.null_projector);
+  read_choice(keys, "null_projector", controller::kNullProjectors, stated.gains.null_projector);
   const int n = arm.model().dof();
   stated.null_weights.setOnes(n);
   read_numbers(keys, "null_weights", text::Units(static_cast<std::size_t>(n)), text::kPositive,
@@ -276,7 +275,7 @@ Json design_json(const TunedArm& arm) {
           {"null_stiffness", of_joints(gains.null_stiffness)},
           {"null_damping",
            damping_json(gains.null_damping_ratio, Eigen::MatrixXd(null_damping.asDiagonal()))},
-          {"null_projector", name_of(settings.null_projector)},
+          {"null_projector", name_of(gains.null_projector)},
           {"null_weights", of_joints(settings.null_weights)},
           {"period", settings.period},
           {"delay", sampled.delay},

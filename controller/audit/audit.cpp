@@ -108,7 +108,7 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
         options.gains.frame == Frame::kBase ? impedance_.base : impedance_.tool;
     const int selected = static_cast<int>(tip.selected.sum());
     springs_ = std::min(n, checked_rank("task_stiffness", tip.stiffness));
-    const bool unprojected = options.null_projector == NullProjector::kNone;
+    const bool unprojected = options.gains.null_projector == NullProjector::kNone;
     springs_ += std::min(std::max(0, n - (unprojected ? springs_ : selected)),
                          static_cast<int>((impedance_.null_stiffness.array() > 0).count()));
   }
@@ -173,7 +173,7 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   }
   const DynamicsResult robot = evaluate(q);
   Impedance impedance = impedance_at(robot);
-  NullSpace null_space(options_.null_projector, options_.null_weights);
+  NullSpace null_space(options_.null_weights);
   if (impedance.null_space()) {
     null_space.compute(robot, impedance);
     if (!null_space.dynamic() && null_space.of_projector().nearly_singular()) {
@@ -247,7 +247,7 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
   const auto projected = [&](const JointVector& gains) -> analysis::NullSpaceDamping {
     const MatrixXd D = gains.asDiagonal();
     MatrixXd W = MatrixXd::Identity(n, n);
-    switch (options_.null_projector) {
+    switch (options_.gains.null_projector) {
       case NullProjector::kNone:
         return {D, MatrixXd::Zero(n, n)};
       case NullProjector::kDynamic:

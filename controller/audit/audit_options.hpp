@@ -13,7 +13,7 @@ struct AuditOptions : LoopTiming {
   /// Stiffness and damping as stated. `directions` in it is ignored: a direction of the task
   /// without stiffness and damping is free. Joint matrices and null-space vectors without entries
   /// count as zero. With a ratio the damping is designed at each posture as Controller does,
-  /// lowered so that the loop keeps `margin`.
+  /// lowered so that the loop keeps `margin`. Many controllers have NullProjector::kKinematic.
   Gains gains;
   /// True if the controller takes the vector part of the error's quaternion, which is half of the
   /// rotation vector, for its rotational error. The springs then act with half of the stated
@@ -25,10 +25,7 @@ struct AuditOptions : LoopTiming {
   /// has one number for the three translations and one for the three rotations.
   bool inertia_blocks = false;
   double margin = 2;  ///< gain margin that is asked for, see PostureAudit::rotors; at least 1
-  /// The projector of the null space's springs and dampers. Many controllers have the kinematic
-  /// one.
-  NullProjector null_projector = NullProjector::kDynamic;
-  JointVector null_weights;  ///< W of the weighted one, n, positive; without entries I
+  JointVector null_weights;  ///< W of NullProjector::kWeighted, n, positive; without entries I
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
   /// Range of sampled postures, n, rad; without entries the position limits of the model.
   JointVector lower, upper;

@@ -19,11 +19,11 @@ Settings judging(Settings settings) {
 
 /// Returns true if the payload adds to the damping. It does not in motions that leave the tip at
 /// rest.
-bool counts_payload(const Gains& gains, Mode mode, NullProjector projector) noexcept {
+bool counts_payload(const Gains& gains, Mode mode) noexcept {
   if (mode == Mode::kJoint) return gains.joint_damping_ratio > 0;
   const auto& held = gains.directions;
-  const bool moves =
-      projector == NullProjector::kNone || std::find(held.begin(), held.end(), false) != held.end();
+  const bool moves = gains.null_projector == NullProjector::kNone ||
+                     std::find(held.begin(), held.end(), false) != held.end();
   return gains.task_damping_ratio > 0 || (moves && gains.null_damping_ratio > 0);
 }
 
@@ -45,7 +45,7 @@ GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
     const bool known = posture_loop_.closed_loop(q, gains, mode, system) == Status::kOk;
     const double found = known ? margin_up_to(system, posture_loop_.sampled(), wanted) : 0;
     if (found < worst.margin) worst = {found, mode};
-    if (!known || !loaded_ || !counts_payload(gains, mode, settings_.null_projector)) continue;
+    if (!known || !loaded_ || !counts_payload(gains, mode)) continue;
     DynamicsResult bare;
     bare_.kernel().evaluate(q, JointVector::Zero(q.size()), bare);
     system.mass = bare.M;

@@ -79,7 +79,7 @@ Impedance stated_impedance(const AuditOptions& stated, int n) {
     checked.directions[static_cast<std::size_t>(i)] =
         !checked.task_stiffness.row(i).isZero(0) || !checked.task_damping.row(i).isZero(0);
   }
-  return Impedance(setpoint, n, stated.null_projector);
+  return Impedance(setpoint, n);
 }
 
 AuditOptions audit_options(const Settings& settings) {
@@ -95,7 +95,6 @@ AuditOptions audit_options(const Settings& settings) {
     }
   }
   options.margin = settings.limits.gain_margin;
-  options.null_projector = settings.null_projector;
   options.null_weights = settings.null_weights;
   options.lower = settings.limits.position_lower;
   options.upper = settings.limits.position_upper;
@@ -116,7 +115,6 @@ std::optional<Settings> designing_settings(const RobotModel& model, const AuditO
   Settings settings = default_settings(model);
   set_timing(options, settings);
   settings.limits.gain_margin = options.period > 0 ? options.margin : 1;
-  settings.null_projector = options.null_projector;
   settings.null_weights = options.null_weights;
   settings.initial.gains = gains;
   Gains& stated = settings.initial.gains;

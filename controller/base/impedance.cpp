@@ -25,9 +25,10 @@ Impedance::Impedance(int n)
       joint_stiffness(JointMatrix::Zero(n, n)),
       joint_damping(JointMatrix::Zero(n, n)) {}
 
-Impedance::Impedance(const Setpoint& setpoint, int n, NullProjector projector) noexcept
-    : Impedance(n) {
+Impedance::Impedance(const Setpoint& setpoint, int n) noexcept : Impedance(n) {
   const Gains& gains = setpoint.gains;
+  projectors = {};
+  projectors[static_cast<std::size_t>(gains.null_projector)] = 1;
   if (setpoint.mode == Mode::kJoint) {
     joint_weight = 1;
     joint_damping_ratio = gains.joint_damping_ratio;
@@ -53,7 +54,7 @@ Impedance::Impedance(const Setpoint& setpoint, int n, NullProjector projector) n
   tip.stiffness = in_selected_directions(gains.task_stiffness);
   tip.damping = in_selected_directions(gains.task_damping);
   if (damping_ratio > 0) tip.damping = beside_springs(tip.stiffness, tip.damping);
-  const bool unprojected = projector == NullProjector::kNone;
+  const bool unprojected = gains.null_projector == NullProjector::kNone;
   if (unprojected || n > tip.selected.sum()) {
     if (gains.null_stiffness.size() == n) null_stiffness = gains.null_stiffness;
     null_damping_ratio = gains.null_damping_ratio;
@@ -102,6 +103,9 @@ Impedance blend(const Impedance& a, const Impedance& b, double s) noexcept {
                             &Impedance::damping_ratio, &Impedance::joint_damping_ratio,
                             &Impedance::null_damping_ratio, &Impedance::common_ratio}) {
     c.*number = r * a.*number + s * b.*number;
+  }
+  for (std::size_t i = 0; i < c.projectors.size(); ++i) {
+    c.projectors[i] = r * a.projectors[i] + s * b.projectors[i];
   }
   for (const auto tip : {&Impedance::base, &Impedance::tool}) {
     mix((a.*tip).stiffness, (b.*tip).stiffness, (c.*tip).stiffness);

@@ -22,8 +22,9 @@ struct Impedance {
   double joint_damping_ratio = 0;  ///< for the joints' springs, beside `joint_damping`
   double null_damping_ratio = 0;   ///< for the null space's springs, beside `null_damping`
   double common_ratio = 0;         ///< share of the tip's springs that null_damping_ratio is for
-  TipImpedance base;               ///< in B's axes
-  TipImpedance tool;               ///< in T's axes
+  std::array<double, 4> projectors{1};  ///< share of each NullProjector
+  TipImpedance base;                    ///< in B's axes
+  TipImpedance tool;                    ///< in T's axes
   JointVector null_stiffness;
   JointVector null_damping;
   JointMatrix joint_stiffness;
@@ -36,11 +37,14 @@ struct Impedance {
   /// are more joints than selected directions, or no projector. With a damping ratio the dampers
   /// given act only where there is no spring: on joints and in directions whose row of the
   /// stiffness is zero, and in the null space if all its stiffness is zero.
-  Impedance(const Setpoint& setpoint, int n,
-            NullProjector projector = NullProjector::kDynamic) noexcept;
+  Impedance(const Setpoint& setpoint, int n) noexcept;
 
   /// Returns the share of the Cartesian springs in all active springs, 1 if there are no others.
   double task_share() const noexcept { return task_weight / (task_weight + joint_weight); }
+  /// Returns the share of a projector.
+  double share(NullProjector projector) const noexcept {
+    return projectors[static_cast<std::size_t>(projector)];
+  }
   /// Returns true if there are springs or dampers in the null space.
   bool null_space() const noexcept;
 };

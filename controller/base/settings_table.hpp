@@ -26,7 +26,7 @@ void for_each_setting(Struct& settings, Visitor&& visit) {
   visit(Setting{"control.period", "s", "", text::kPositive}, settings.period);
   visit(Setting{"control.mode"}, settings.initial.mode);
   visit(Setting{"control.load"}, settings.task_terms.load);
-  visit(Setting{"control.null_projector"}, settings.null_projector);
+  visit(Setting{"control.null_projector"}, settings.initial.gains.null_projector);
   visit(Setting{"control.null_weights", "", "", {1e-3, true, 1e3}}, settings.null_weights);
   visit(Setting{"control.energy"}, settings.energy.from);
   visit(Setting{"control.energy_store", "J", "", text::kPositive}, settings.energy.store);

@@ -261,7 +261,7 @@ void read_null_projector(const text::YamlMapping& root, const RobotModel& model,
   for_each_setting(settings, [&](const Setting& setting, auto& value) {
     if (std::string_view(setting.key).starts_with("control.null_")) reader(setting, value);
   });
-  projector = settings.null_projector;
+  projector = settings.initial.gains.null_projector;
   weights = settings.null_weights;
 }
 

@@ -54,12 +54,12 @@ SetpointHistory::News SetpointHistory::take(const Setpoint& setpoint, std::int64
   if (same) return News::kGoal;
   accepted_.mode = setpoint.mode;
   accepted_.gains = setpoint.gains;
-  gains_.set_target(Impedance(accepted_, n_, settings_.null_projector));
+  gains_.set_target(Impedance(accepted_, n_));
   return News::kGains;
 }
 
 void SetpointHistory::restart(const Sensed& now) noexcept {
-  const Impedance target(accepted_, n_, settings_.null_projector);
+  const Impedance target(accepted_, n_);
   Impedance none(n_);
   none.base.selected = target.base.selected;
   none.tool.selected = target.tool.selected;
@@ -67,6 +67,7 @@ void SetpointHistory::restart(const Sensed& now) noexcept {
   none.joint_damping_ratio = target.joint_damping_ratio;
   none.null_damping_ratio = target.null_damping_ratio;
   none.common_ratio = target.common_ratio;
+  none.projectors = target.projectors;
   gains_.start(none);
   gains_.set_target(target);
   wrench_.start(Vector6::Zero());

@@ -25,12 +25,11 @@ void RatioDamper::update(const JointMatrix& M, const Jacobian* J) noexcept {
 }
 
 DesignedDamping::DesignedDamping(const JointVector& viscous_friction,
-                                 const analysis::BorneDamping& borne, NullProjector projector,
-                                 const JointVector& weights)
+                                 const analysis::BorneDamping& borne, const JointVector& weights)
     : borne_(borne),
       joint_damper_(static_cast<int>(viscous_friction.size())),
       in_force_(static_cast<int>(viscous_friction.size())),
-      null_space_(projector, weights) {
+      null_space_(weights) {
   if ((viscous_friction.array() > 0).any()) friction_ = viscous_friction;
 }
 

@@ -53,10 +53,9 @@ class RatioDamper {
 class DesignedDamping {
  public:
   /// `viscous_friction` is the friction of the robot's joints, n, N m s/rad. The achievable damping
-  /// of the loop limits the ratios. `projector` and `weights` define the null space.
+  /// of the loop limits the ratios. `weights` are those of the weighted projector.
   explicit DesignedDamping(const JointVector& viscous_friction,
                            const analysis::BorneDamping& borne = {},
-                           NullProjector projector = NullProjector::kDynamic,
                            const JointVector& weights = {});
   DesignedDamping(const DesignedDamping&) = delete;  // the dampers point to the achievable damping
   DesignedDamping& operator=(const DesignedDamping&) = delete;

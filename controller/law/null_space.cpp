@@ -21,11 +21,14 @@ void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
     A.noalias() += y * y.transpose();
   }
   inertia_.compute(A, impedance.base, impedance.tool, robot.R_BT);
-  if (!dynamic()) {
+  dynamic_ = impedance.share(NullProjector::kDynamic);
+  const double given = impedance.share(NullProjector::kWeighted);
+  weighted_ = given + impedance.share(NullProjector::kKinematic);
+  unprojected_ = impedance.share(NullProjector::kNone);
+  if (weighted_ > 0) {
     J_ = robot.J;
-    if (per_weight_.size() != n) per_weight_.setOnes(n);
-  }
-  if (!dynamic() && !unprojected()) {
+    per_weight_.setOnes(n);
+    if (per_given_.size() == n) add(per_given_ - per_weight_, per_weight_, given / weighted_);
     const Jacobian weighted = J_ * per_weight_.asDiagonal();
     of_weights_.compute(weighted * J_.transpose(), impedance.base, impedance.tool, robot.R_BT);
   }
@@ -39,19 +42,26 @@ void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
 JointVector NullSpace::spring(const JointVector& k, const JointVector& dq) const noexcept {
   JointVector y(dq.size());
   for (Eigen::Index i = 0; i < dq.size(); ++i) y[i] = k[i] * dq[i];
-  if (!dynamic()) return y - held(per_weight_.cwiseProduct(y));
-  mass_.solve_L(y.data());
-  project(y);
-  mass_.multiply_L(y.data());
+  JointVector taken;  // by the share of weights
+  if (weighted_ > 0) taken = weighted_ * held(per_weight_.cwiseProduct(y));
+  if (dynamic_ > 0) {
+    mass_.solve_L(y.data());
+    project(y, dynamic_);
+    mass_.multiply_L(y.data());
+  }
+  if (weighted_ > 0) y -= taken;
   return y;
 }
 
 JointVector NullSpace::projected_velocity(const JointVector& dq) const noexcept {
-  JointVector y = dq;
-  if (!dynamic()) return y - per_weight_.cwiseProduct(held(y));
-  mass_.multiply_LT(y.data());
-  project(y);
-  mass_.solve_LT(y.data());
+  JointVector y = dq, taken;
+  if (weighted_ > 0) taken = weighted_ * per_weight_.cwiseProduct(held(y));
+  if (dynamic_ > 0) {
+    mass_.multiply_LT(y.data());
+    project(y, dynamic_);
+    mass_.solve_LT(y.data());
+  }
+  if (weighted_ > 0) y -= taken;
   return y;
 }
 
@@ -69,7 +79,7 @@ void NullSpace::damp(const Eigen::Matrix3d& R_BT, const Damping& damping) noexce
   const Eigen::Index n = k.size();
   JointMatrix& D = ratio_damping_;
   D.resize(n, n);
-  if (!unprojected() && damp_one_motion(k, damping)) return;
+  if (unprojected_ == 0 && damp_one_motion(k, damping)) return;
   Matrix6 K_C = Matrix6::Zero();
   if (impedance.common_ratio > 0) {
     K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, R_BT);
@@ -80,7 +90,7 @@ void NullSpace::damp(const Eigen::Matrix3d& R_BT, const Damping& damping) noexce
     JointVector& y = velocity[static_cast<std::size_t>(j)];
     y.setZero(n);
     y[j] = 1;
-    if (!unprojected()) project(y);
+    project(y, 1 - unprojected_);
     mass_.solve_LT(y.data());
     const Vector6 pull = K_C * Jh_.col(j);  // of a P = I
     for (Eigen::Index i = 0; i <= j; ++i) {
@@ -139,9 +149,12 @@ JointVector NullSpace::ratio_damper(const JointVector& dqd) const noexcept {
 
 JointVector NullSpace::explained(const Vector6& e) const noexcept {
   if (dynamic()) return joint_velocity(e);
-  JointVector dq = JointVector::Zero(J_.cols());
+  JointVector dq = JointVector::Zero(Jh_.cols()), result = dq;
+  if (dynamic_ > 0) add(joint_velocity(e), result, dynamic_);
+  if (weighted_ == 0) return result;
   add_torque(J_, of_weights_.wrench(e), dq);
-  return per_weight_.cwiseProduct(dq);
+  add(per_weight_.cwiseProduct(dq), result, weighted_);
+  return result;
 }
 
 JointVector NullSpace::joint_velocity(const Vector6& twist) const noexcept {

@@ -29,14 +29,15 @@ namespace dashpot::controller {
 /// NullProjector::kNone has N = I: its springs and dampers act in all joints, and so on the tip as
 /// well. The damping for a ratio has P = I, and, with Impedance::common_ratio, K_0 + J' K_C
 /// J for K_0.
+///
+/// While gains change from one projector to another, J# of N = I - J# J is the mean of theirs by
+/// their shares, and so are N, the P of the damping, and W^-1. A mean of generalised inverses is
+/// one, so that N remains a projector on the same motions unless kNone has a share.
 class NullSpace {
  public:
-  /// `weights` is W (n); without entries it is I.
-  explicit NullSpace(NullProjector projector = NullProjector::kDynamic,
-                     const JointVector& weights = {}) noexcept
-      : projector_(projector) {
-    if (projector == NullProjector::kWeighted) per_weight_ = weights.cwiseInverse();
-  }
+  /// `weights` is W of NullProjector::kWeighted (n); without entries it is I.
+  explicit NullSpace(const JointVector& weights = {}) noexcept
+      : per_given_(weights.cwiseInverse()) {}
 
   /// Computes the null space of the directions that an impedance selects, and, if it has null-space
   /// springs and a ratio for them, the damping D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, in
@@ -75,17 +76,19 @@ class NullSpace {
     return inertia_.wrench(twist(Jh_, torque));
   }
   const TaskInertia& inertia() const noexcept { return inertia_; }
-  bool dynamic() const noexcept { return projector_ == NullProjector::kDynamic; }
-  bool unprojected() const noexcept { return projector_ == NullProjector::kNone; }
-  /// Returns the inertia, or, of another projector, what is in its place, with W for M.
+  bool dynamic() const noexcept { return dynamic_ == 1; }
+  double dynamic_share() const noexcept { return dynamic_; }
+  double weighted_share() const noexcept { return weighted_; }  ///< kKinematic included
+  double unprojected_share() const noexcept { return unprojected_; }
+  /// Returns the inertia, or, of a projector with weights, what is in its place, with W for M.
   const TaskInertia& of_projector() const noexcept { return dynamic() ? inertia_ : of_weights_; }
-  /// Returns W^-1 of a projector that is not dynamic, n.
+  /// Returns W^-1 of the share of weights, n.
   const JointVector& per_weight() const noexcept { return per_weight_; }
   /// Returns L.
   const SmallCholesky& mass() const noexcept { return mass_; }
-  /// Replaces y by P y.
-  void project(JointVector& y) const noexcept {
-    add_torque(Jh_, -inertia_.wrench(twist(Jh_, y)), y);
+  /// Replaces y by P y, or by (1 - share) y + share P y.
+  void project(JointVector& y, double share = 1) const noexcept {
+    add_torque(Jh_, -share * inertia_.wrench(twist(Jh_, y)), y);
   }
 
  private:
@@ -110,11 +113,11 @@ class NullSpace {
   /// Sets D if P is a projector on one motion; returns false if not.
   bool damp_one_motion(const JointVector& k, const Damping& damping) noexcept;
 
-  NullProjector projector_;
+  double dynamic_ = 1, weighted_ = 0, unprojected_ = 0;  ///< shares of projectors
   TaskInertia inertia_;
-  TaskInertia of_weights_;  ///< with W for M, as are the next two; zero without a projector
+  TaskInertia of_weights_;  ///< with W for M, as are the next two
   Jacobian J_;
-  JointVector per_weight_;  ///< W^-1
+  JointVector per_weight_, per_given_;  ///< W^-1, now and of NullProjector::kWeighted
   SmallCholesky mass_;
   Jacobian Jh_;
   JointMatrix ratio_damping_;

@@ -152,6 +152,10 @@ std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept 
       *given->frame != DASHPOT_FRAME_TOOL) {
     return DASHPOT_WRONG_VALUE;
   }
+  if (given->null_projector != nullptr &&
+      (*given->null_projector < 0 || *given->null_projector > DASHPOT_PROJECTOR_NONE)) {
+    return DASHPOT_WRONG_VALUE;
+  }
   if (!ratio_fits(given->task_damping, given->task_damping_ratio) ||
       !ratio_fits(given->joint_damping, given->joint_damping_ratio) ||
       !ratio_fits(given->null_damping, given->null_damping_ratio)) {
@@ -168,6 +172,9 @@ std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept 
   if (given->null_damping != nullptr) gains.null_damping = vector(given->null_damping, n);
   if (given->frame != nullptr) {
     gains.frame = *given->frame == DASHPOT_FRAME_TOOL ? Frame::kTool : Frame::kBase;
+  }
+  if (given->null_projector != nullptr) {
+    gains.null_projector = static_cast<NullProjector>(*given->null_projector);
   }
   if (given->directions != nullptr) {
     for (std::size_t i = 0; i < 6; ++i) gains.directions[i] = given->directions[i] != 0;

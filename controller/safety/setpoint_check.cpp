@@ -91,6 +91,9 @@ SetpointFault check_gains(const Gains& gains, Mode mode, Eigen::Index n) noexcep
   if ((reason = vector_fault(gains.null_stiffness, n))) return {"null_stiffness", reason};
   if ((reason = vector_fault(gains.null_damping, n))) return {"null_damping", reason};
   if (!is_ratio(gains.null_damping_ratio)) return {"null_damping_ratio", kNoRatio};
+  if (static_cast<std::size_t>(gains.null_projector) >= kNullProjectors.size()) {
+    return {"null_projector", "is unknown"};
+  }
   if (gains.frame != Frame::kBase && gains.frame != Frame::kTool) return {"frame", "is unknown"};
   return {};
 }
@@ -133,7 +136,8 @@ bool same_gains(const Gains& a, const Gains& b, Mode mode) noexcept {
   return a.frame == b.frame && a.directions == b.directions &&
          same(a.task_stiffness, b.task_stiffness) && same(a.task_damping, b.task_damping) &&
          a.task_damping_ratio == b.task_damping_ratio && same(a.null_stiffness, b.null_stiffness) &&
-         same(a.null_damping, b.null_damping) && a.null_damping_ratio == b.null_damping_ratio;
+         same(a.null_damping, b.null_damping) && a.null_damping_ratio == b.null_damping_ratio &&
+         a.null_projector == b.null_projector;
 }
 
 }  // namespace dashpot::controller

@@ -205,12 +205,14 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Actin
   std::optional<NullSpaceChange> change;
   TipWrenches wrenches = acting.wrenches;
   if (acting.posture && impedance.null_space() && (loaded || terms.jacobian_rate)) {
-    if (null_space.unprojected()) {
-      wrenches.posture =
-          null_space.wrench_of(impedance.null_stiffness.cwiseProduct(acting.posture->error));
-    } else {
+    const double unprojected = null_space.unprojected_share();
+    if (unprojected > 0) {
+      const JointVector pull = impedance.null_stiffness.cwiseProduct(acting.posture->error);
+      wrenches.posture = unprojected * null_space.wrench_of(pull);
+    }
+    if (unprojected < 1) {
       change.emplace(*acting.posture->kernel, *acting.posture->q, robot, null_space,
-                     !impedance.tool.none(), null_space.dynamic());
+                     !impedance.tool.none());
     }
   }
   if (loaded) {

@@ -11,42 +11,60 @@ using Eigen::Vector3d;
 NullSpaceChange::NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q,
                                  const DynamicsResult& robot, const NullSpace& null_space,
                                  bool in_tool_axes, bool dynamic) noexcept
-    : tool_(in_tool_axes), dynamic_(dynamic), J_(robot.J), mass_(kernel, q, robot.J) {
+    : tool_(in_tool_axes), J_(robot.J), mass_(kernel, q, robot.J) {
   const Index n = J_.cols();
-  share_.resize(n, 6);
-  const TaskInertia& inertia = dynamic_ ? null_space.inertia() : null_space.of_projector();
-  for (Index i = 0; i < 6; ++i) {
-    const Vector6 unit = Vector6::Unit(i);
-    inertia_.col(i) = inertia.wrench(unit);
-    share_.col(i) = dynamic_ ? null_space.joint_velocity(unit) : null_space.explained(unit);
-  }
-  tip_torque_ = J_.transpose().lazyProduct(inertia_);
-  mobility_.resize(n, n);
-  for (Index i = 0; i < n; ++i) {
-    const JointVector unit = JointVector::Unit(n, i);
-    mobility_.col(i) = dynamic_ ? null_space.projected_acceleration(unit)
-                                : null_space.projected_velocity(null_space.per_weight()[i] * unit);
+  parts_[0].dynamic = true;
+  parts_[0].factor = dynamic ? 1 - null_space.unprojected_share() : null_space.dynamic_share();
+  parts_[1].factor = dynamic ? 0 : null_space.weighted_share();
+  share_.setZero(n, 6);
+  for (Part& part : parts_) {
+    if (part.factor == 0) continue;
+    fill(null_space, part);
+    share_ += part.factor * part.share;
   }
   torque_projector_ = JointMatrix::Identity(n, n);
   torque_projector_ -= J_.transpose().lazyProduct(share_.transpose());
-  spreads_ = inertia.nearly_singular();
-  if (spreads_) set_spread(null_space);
 }
 
-void NullSpaceChange::set_spread(const NullSpace& null_space) noexcept {
+void NullSpaceChange::fill(const NullSpace& null_space, Part& part) noexcept {
   const Index n = J_.cols();
-  const TaskInertia& inertia = dynamic_ ? null_space.inertia() : null_space.of_projector();
-  moved_ = J_.transpose();
-  if (!dynamic_) moved_ = null_space.per_weight().asDiagonal() * moved_;
-  for (Index i = 0; i < 6 && dynamic_; ++i) {
-    null_space.mass().solve_L(&moved_(0, i));
-    null_space.mass().solve_LT(&moved_(0, i));
+  const TaskInertia& inertia = part.dynamic ? null_space.inertia() : null_space.of_projector();
+  part.share.resize(n, 6);
+  for (Index i = 0; i < 6; ++i) {
+    const Vector6 unit = Vector6::Unit(i);
+    part.inertia.col(i) = inertia.wrench(unit);
+    if (part.dynamic) part.share.col(i) = null_space.joint_velocity(unit);
+  }
+  part.tip_torque = J_.transpose().lazyProduct(part.inertia);
+  if (!part.dynamic) part.share = null_space.per_weight().asDiagonal() * part.tip_torque;
+  part.projector = JointMatrix::Identity(n, n);
+  part.projector -= J_.transpose().lazyProduct(part.share.transpose());
+  part.mobility.resize(n, n);
+  for (Index i = 0; i < n; ++i) {
+    if (part.dynamic) {
+      part.mobility.col(i) = null_space.projected_acceleration(JointVector::Unit(n, i));
+    } else {
+      part.mobility.col(i) = null_space.per_weight()[i] * part.projector.row(i).transpose();
+    }
+  }
+  part.spreads = inertia.nearly_singular();
+  if (part.spreads) set_spread(null_space, part);
+}
+
+void NullSpaceChange::set_spread(const NullSpace& null_space, Part& part) noexcept {
+  const Index n = J_.cols();
+  const TaskInertia& inertia = part.dynamic ? null_space.inertia() : null_space.of_projector();
+  part.moved = J_.transpose();
+  if (!part.dynamic) part.moved = null_space.per_weight().asDiagonal() * part.moved;
+  for (Index i = 0; i < 6 && part.dynamic; ++i) {
+    null_space.mass().solve_L(&part.moved(0, i));
+    null_space.mass().solve_LT(&part.moved(0, i));
   }
   std::array<Matrix6, kMaxJoints> change;  // of J M^-1 J' by each joint, column by column
   for (Index i = 0; i < 6; ++i) {
-    const JointVector x = moved_.col(i);
+    const JointVector x = part.moved.col(i);
     const Jacobian turned = twists(x);
-    const Jacobian heavier = moved_.transpose().lazyProduct(inert(x));
+    const Jacobian heavier = part.moved.transpose().lazyProduct(inert(part, x));
     for (Index k = 0; k < n; ++k) {
       // The inertia's part is symmetric, so that half of it can be mirrored.
       change[static_cast<std::size_t>(k)].col(i) = turned.col(k) - 0.5 * heavier.col(k);
@@ -54,12 +72,12 @@ void NullSpaceChange::set_spread(const NullSpace& null_space) noexcept {
   }
   for (Index k = 0; k < n; ++k) {
     const Matrix6& half = change[static_cast<std::size_t>(k)];
-    spread_[static_cast<std::size_t>(k)] = inertia.spread(half + half.transpose());
+    part.spread[static_cast<std::size_t>(k)] = inertia.spread(half + half.transpose());
   }
 }
 
-JointMatrix NullSpaceChange::inert(const JointVector& x) const noexcept {
-  return dynamic_ ? mass_.times(x) : JointMatrix::Zero(x.size(), x.size());
+JointMatrix NullSpaceChange::inert(const Part& part, const JointVector& x) const noexcept {
+  return part.dynamic ? mass_.times(x) : JointMatrix::Zero(x.size(), x.size());
 }
 
 Vector6 NullSpaceChange::turning(const Vector6& V, Index k) const noexcept {
@@ -89,29 +107,39 @@ JointMatrix NullSpaceChange::torques(const Vector6& F) const noexcept {
 }
 
 JointMatrix NullSpaceChange::of_joint_velocity(const Vector6& V) const noexcept {
-  const JointVector x = share_ * V;
-  const JointMatrix moved = torques(inertia_ * V) - inert(x);
-  JointMatrix change = mobility_.lazyProduct(moved);
-  change -= share_.lazyProduct(twists(x));
-  for (Index k = 0; spreads_ && k < change.cols(); ++k) {
-    change.col(k) -= moved_ * (spread_[static_cast<std::size_t>(k)] * V);
+  JointMatrix sum = JointMatrix::Zero(J_.cols(), J_.cols());
+  for (const Part& part : parts_) {
+    if (part.factor == 0) continue;
+    const JointVector x = part.share * V;
+    const JointMatrix moved = torques(part.inertia * V) - inert(part, x);
+    JointMatrix change = part.mobility.lazyProduct(moved);
+    change -= part.share.lazyProduct(twists(x));
+    for (Index k = 0; part.spreads && k < change.cols(); ++k) {
+      change.col(k) -= part.moved * (part.spread[static_cast<std::size_t>(k)] * V);
+    }
+    sum += part.factor * change;
   }
-  return change;
+  return sum;
 }
 
 JointMatrix NullSpaceChange::of_torque(const JointVector& t) const noexcept {
-  JointVector z = JointVector::Zero(t.size());
-  add_product(mobility_, t, z);
-  const Vector6 h = share_.transpose() * t;
-  JointMatrix change = inert(z);
-  const JointMatrix projected = torques(h) + change;
-  change -= torque_projector_.lazyProduct(projected);
-  change -= tip_torque_.lazyProduct(twists(z));
-  const Vector6 a = spreads_ ? Vector6(moved_.transpose() * t) : Vector6(Vector6::Zero());
-  for (Index k = 0; spreads_ && k < change.cols(); ++k) {
-    change.col(k) += J_.transpose() * (spread_[static_cast<std::size_t>(k)] * a);
+  JointMatrix sum = JointMatrix::Zero(t.size(), t.size());
+  for (const Part& part : parts_) {
+    if (part.factor == 0) continue;
+    JointVector z = JointVector::Zero(t.size());
+    add_product(part.mobility, t, z);
+    const Vector6 h = part.share.transpose() * t;
+    JointMatrix change = inert(part, z);
+    const JointMatrix projected = torques(h) + change;
+    change -= part.projector.lazyProduct(projected);
+    change -= part.tip_torque.lazyProduct(twists(z));
+    const Vector6 a = part.spreads ? Vector6(part.moved.transpose() * t) : Vector6(Vector6::Zero());
+    for (Index k = 0; part.spreads && k < change.cols(); ++k) {
+      change.col(k) += J_.transpose() * (part.spread[static_cast<std::size_t>(k)] * a);
+    }
+    sum += part.factor * change;
   }
-  return change;
+  return sum;
 }
 
 }  // namespace dashpot::controller

@@ -14,15 +14,16 @@ namespace dashpot::controller {
 /// If the arm is nearly singular, G changes by -S_k = -TaskInertia::spread as well, which adds
 ///     -M^-1 J' S_k V    and    J' S_k J M^-1 t.
 /// For a projector with constant weights W, M is W, and dM_k is zero. If the selected directions
-/// turn with the tool, the turning of J's rows is subtracted from dJ_k.
+/// turn with the tool, the turning of J's rows is subtracted from dJ_k. Of several projectors each
+/// adds its share.
 class NullSpaceChange {
  public:
   using TipMatrix = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, kMaxJoints, 6>;
 
-  /// `robot` and `null_space` come from the kernel at `q`. The projector is the one of `null_space`
-  /// or the dynamic one.
+  /// `robot` and `null_space` come from the kernel at `q`. The projectors are those of `null_space`
+  /// or, if `dynamic`, the dynamic one for all that is projected.
   NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q, const DynamicsResult& robot,
-                  const NullSpace& null_space, bool in_tool_axes, bool dynamic) noexcept;
+                  const NullSpace& null_space, bool in_tool_axes, bool dynamic = false) noexcept;
 
   /// Returns d(J# V)/dq, n x n, for a V that is constant in the axes of the selected directions.
   JointMatrix of_joint_velocity(const Vector6& V) const noexcept;
@@ -39,20 +40,27 @@ class NullSpaceChange {
  private:
   /// (dJ/dq_k)' F by columns
   JointMatrix torques(const Vector6& F) const noexcept;
-  void set_spread(const NullSpace& null_space) noexcept;
+  /// Of one projector.
+  struct Part {
+    bool dynamic = false;
+    double factor = 0;                       ///< its share
+    Matrix6 inertia;                         ///< G
+    TipMatrix share, tip_torque;             ///< J#, J' G
+    JointMatrix mobility, projector;         ///< M^-1 N', N'
+    TipMatrix moved;                         ///< M^-1 J'
+    bool spreads = false;                    ///< the arm is nearly singular
+    std::array<Matrix6, kMaxJoints> spread;  ///< S_k
+  };
+  void fill(const NullSpace& null_space, Part& part) noexcept;
+  void set_spread(const NullSpace& null_space, Part& part) noexcept;
   /// (dM/dq_k x) by columns
-  JointMatrix inert(const JointVector& x) const noexcept;
+  JointMatrix inert(const Part& part, const JointVector& x) const noexcept;
 
   bool tool_;
-  bool dynamic_;
   Jacobian J_;
   MassChange mass_;
-  Matrix6 inertia_;                         ///< G
-  TipMatrix share_, tip_torque_;            ///< J#, J' G
-  JointMatrix mobility_;                    ///< M^-1 N'
-  TipMatrix moved_;                         ///< M^-1 J'
-  bool spreads_;                            ///< the arm is nearly singular
-  std::array<Matrix6, kMaxJoints> spread_;  ///< S_k
+  std::array<Part, 2> parts_;
+  TipMatrix share_;
   JointMatrix torque_projector_;
 };
 

@@ -158,15 +158,16 @@ DesignedDamping designed_damping(const RobotModel& model, const Settings& settin
   const analysis::BorneDamping borne =
       margin == 1 ? analysis::BorneDamping()
                   : analysis::BorneDamping(timed(timing_of(settings), loop), kReserve * margin);
-  return DesignedDamping(subtracted, borne, settings.null_projector, settings.null_weights);
+  return DesignedDamping(subtracted, borne, settings.null_weights);
 }
 
 JointMatrix null_projector(const DynamicsResult& robot, NullProjector projector,
                            const JointVector& weights) noexcept {
-  Impedance tip(static_cast<int>(robot.M.rows()));
-  tip.base.selected.setOnes();
-  NullSpace null_space(projector, weights);
-  null_space.compute(robot, tip);
+  Setpoint setpoint;
+  setpoint.mode = Mode::kCartesian;
+  setpoint.gains.null_projector = projector;
+  NullSpace null_space(weights);
+  null_space.compute(robot, Impedance(setpoint, static_cast<int>(robot.M.rows())));
   JointMatrix N(robot.M.rows(), robot.M.cols());
   null_projector(null_space, N);
   return N;
@@ -210,7 +211,7 @@ Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode m
   Setpoint setpoint;
   setpoint.mode = mode;
   setpoint.gains = gains;
-  const GainBlend given(1, Impedance(setpoint, n, settings_.null_projector));
+  const GainBlend given(1, Impedance(setpoint, n));
   damping_.reset();
   const Impedance& impedance = damping_.update(given, robot);
   level_ = damping_.level(given.now());

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import Error
 from ._results import Array, ComplexArray, IntArray, Result, TextArray, stack, table, to_gain, to_numbers, to_vector
-from ._robot import is_cartesian, is_tool, selected
+from ._robot import is_cartesian, is_tool, known_projector, selected
 
 
 class Status(enum.IntEnum):
@@ -343,10 +343,12 @@ class Controller:
                   task_damping_ratio: float | None = None,
                   null_stiffness: npt.ArrayLike | None = None,
                   null_damping: npt.ArrayLike | None = None,
-                  null_damping_ratio: float | None = None, frame: str | None = None,
+                  null_damping_ratio: float | None = None, null_projector: str | None = None,
+                  frame: str | None = None,
                   directions: Sequence[str] | None = None) -> None:
         """Sets gains for the next tick; None keeps a gain. Matrices (n x n, 6 x 6) may be given as
-        their diagonals, null_stiffness and null_damping have n entries. Raises Error for impossible
+        their diagonals, null_stiffness and null_damping have n entries. `null_projector` is
+        "dynamic", "kinematic", "weighted" or "none", as in `control` of a configuration. Raises Error for impossible
         gains, and for gains with too small a gain margin of the sampled loop. Warns, once of each
         kind, if such gains are accepted because the margin was smaller before, and of gains that
         look like another unit or order."""
@@ -449,6 +451,8 @@ def _gains(given: dict[str, Any]) -> dict[str, Any]:
             result[key] = selected(value)
         elif key.endswith("_ratio"):
             result[key] = np.array([[float(value)]])
+        elif key == "null_projector":
+            result.update(known_projector(value, None))
         elif key.startswith("null_"):
             result[key] = _column(to_numbers(key, value, 1))
         elif key in ("joint_stiffness", "joint_damping", "task_stiffness", "task_damping"):

@@ -44,7 +44,7 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   take("inertia_blocks", options.inertia_blocks);
   std::string projector;
   take("null_projector", projector);
-  options.null_projector = controller::null_projector_of(projector);
+  options.gains.null_projector = controller::null_projector_of(projector);
   take("period", options.period);
   take("delay", options.delay);
   take("cutoff", options.cutoff);

@@ -133,6 +133,11 @@ class GainsData {
       frame_ = nb::cast<bool>(keys["tool_frame"]) ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE;
       given.frame = &frame_;
     }
+    if (keys.contains("null_projector")) {
+      const auto name = nb::cast<std::string>(keys["null_projector"]);
+      projector_ = static_cast<std::int32_t>(controller::null_projector_of(name));
+      given.null_projector = &projector_;
+    }
     if (keys.contains("directions")) {
       const auto selected = nb::cast<std::vector<bool>>(keys["directions"]);
       if (selected.size() != directions_.size()) {
@@ -156,7 +161,7 @@ class GainsData {
 
   Eigen::Index n_;
   Numbers numbers_;
-  std::int32_t frame_ = 0;
+  std::int32_t frame_ = 0, projector_ = 0;
   std::array<std::uint8_t, 6> directions_{};
 };
 

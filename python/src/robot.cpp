@@ -56,15 +56,15 @@ Eigen::MatrixXd tip_pose(const Robot& robot, const Eigen::VectorXd& q) {
   return T_BT;
 }
 
-analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, const Gains& gains,
+analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, Gains gains,
                                   controller::Mode mode, const OptionalVector& wrench,
                                   controller::Load load, const std::string& projector,
                                   const OptionalVector& weights) {
   const controller::SetpointFault fault = check_gains(gains, mode, robot.model.dof());
   if (fault) throw std::invalid_argument(std::string(fault.key) + " " + fault.reason);
+  gains.null_projector = controller::null_projector_of(projector);
   Settings settings = controller::default_settings(robot.model);
   settings.task_terms.load = load;
-  settings.null_projector = controller::null_projector_of(projector);
   if (weights) settings.null_weights = robot.joint_vector("null_weights", *weights);
   settings.limits.gain_margin = 1;  // no loop is given for which a ratio could be lowered
   return controller::PostureLoop(robot.model, settings)

@@ -23,7 +23,7 @@ ARMS = {  # base, tip, posture
 class Loop:
     """The controller on MuJoCo's arm, whose tip a steady wrench pushes."""
 
-    def __init__(self, root, name, wrench):
+    def __init__(self, root, name, wrench, **null_space):
         base, tip, home = ARMS[name]
         path = root / f"sim/models/{name}.urdf"
         self.model = mujoco.MjModel.from_xml_path(str(path))
@@ -42,9 +42,10 @@ class Loop:
         self.controller = dashpot.Controller({
             "robot": {"urdf": str(path), "base": base, "tip": tip, "reflected_inertia": ROTORS,
                       "viscous_friction": 0, "coulomb_friction": 0},
-            "control": {"period": PERIOD, "mode": "cartesian", "load": "base_wrench"},
+            "control": {"period": PERIOD, "mode": "cartesian", "load": "base_wrench",
+                        "null_weights": [4, 1, 1, 1, 1, 1, 1]},
             "gains": {"task": {"stiffness": [700, 400, 250, 60, 30, 12], "damping_ratio": 0.6},
-                      "null_space": {"stiffness": [5] * 7, "damping_ratio": 0.6}},
+                      "null_space": null_space or {"stiffness": [5] * 7, "damping_ratio": 0.6}},
             "limits": {"torque": 500, "torque_rate": 1e6, "gain_margin": 1, "velocity": 10,
                        "beyond_model": True},
             "analysis": {"share": 1, "sampled": {"interval": 0.2}},
@@ -73,6 +74,25 @@ def test_modes_under_a_steady_wrench_are_those_of_the_motion(root, name):
     loop = Loop(root, name, [12, -10, 14, 0.4, 0.3, -0.5])
     for k in range(44000):  # 11 s
         loop.tick(min(1, k / 4000))
+    expect_modes_of_motion(loop, name)
+
+
+@pytest.mark.parametrize("projector", ["kinematic", "weighted", "none", "dynamic"])
+def test_modes_after_a_switch_of_the_projector_are_those_of_the_motion(root, projector):
+    loop = Loop(root, "panda", [0] * 6, stiffness=[40] * 7, damping=[1] * 7)
+    if projector == "dynamic":
+        loop.controller.set_gains(null_projector="none")
+    for k in range(8000):  # 2 s
+        if k == 4000:
+            before = loop.controller.modes().natural_frequency
+            loop.controller.set_gains(null_projector=projector)
+        loop.tick()
+    assert abs(loop.controller.modes().natural_frequency / before - 1).max() > 0.02
+    expect_modes_of_motion(loop, projector)
+
+
+def expect_modes_of_motion(loop, name):
+    """Expects the modes of the sampled loop in small motions of an arm at rest."""
     assert abs(loop.data.qvel).max() < 1e-10
     settled = 1e-9 * loop.time
     stride, samples, random = 40, 20, np.random.default_rng(1)

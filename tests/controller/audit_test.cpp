@@ -172,7 +172,7 @@ TEST_F(AuditOfPanda, TakesProjectorsOfPseudoInverses) {
   options.gains.null_stiffness = JointVector::Constant(7, 10);
   options.gains.null_damping = JointVector::Constant(7, 6);
   for (const NullProjector projector : {NullProjector::kKinematic, NullProjector::kWeighted}) {
-    options.null_projector = projector;
+    options.gains.null_projector = projector;
     const bool weighted = projector == NullProjector::kWeighted;
     if (weighted) options.null_weights = JointVector::LinSpaced(7, 0.3, 3);
     const MatrixXd W =
@@ -197,7 +197,7 @@ TEST_F(AuditOfPanda, TakesProjectorsOfPseudoInverses) {
 TEST_F(AuditOfPanda, TakesSpringsOfTipAndJointsAtOnce) {
   options.gains.null_stiffness = JointVector::LinSpaced(7, 40, 10);
   options.gains.null_damping = JointVector::LinSpaced(7, 6, 1);
-  options.null_projector = NullProjector::kNone;
+  options.gains.null_projector = NullProjector::kNone;
   const Audit audit(model, options);
   for (int k = 0; k < 50; ++k) {
     const JointVector q = audit.posture(1, k);

@@ -133,8 +133,8 @@ TEST(DesignedDamping, HoldsOneRatioOfSpringsAtTheTipAndInTheJoints) {
     SCOPED_TRACE(arm.file);
     const RobotModel model = testing::smooth_arm(arm);
     Settings settings = plain_settings(model, Mode::kCartesian);
-    settings.null_projector = NullProjector::kNone;
     Gains& gains = settings.initial.gains;
+    gains.null_projector = NullProjector::kNone;
     gains.task_damping_ratio = 0.4;
     gains.null_damping_ratio = 0.7;
     gains.null_stiffness.setConstant(30);

@@ -50,7 +50,6 @@ struct Case {
   SpringReferences references;
   Vector3d p_d;
   Quaterniond R_d;
-  NullProjector projector = NullProjector::kDynamic;
   JointVector weights = JointVector::LinSpaced(n, 0.3, 3);
 
   Case(const RobotModel& robot_model, Random& random)
@@ -74,7 +73,7 @@ struct Case {
   }
   JointVector torque(const Impedance& impedance, const FeedForward& parts, const Vector6& wrench) {
     ImpedanceLaw law(model, parts);
-    NullSpace null_space(projector, weights);
+    NullSpace null_space(weights);
     null_space.compute(robot, impedance);
     LawTorque result;
     law.torque({robot, q, qd, impedance, null_space, references, kEndless, wrench}, result);
@@ -149,11 +148,12 @@ TEST(JointImpedance, IsItsEquation) {
   }
 }
 
-/// Cartesian law for any directions and frame, with the Moore-Penrose form of the projector.
+/// Cartesian law for any directions and frame, with the Moore-Penrose form of a projector, or of
+/// its way to a second one, whose share is `s`.
 void expect_task_law(const RobotModel& model, Random& random,
-                     NullProjector kind = NullProjector::kDynamic) {
+                     NullProjector kind = NullProjector::kDynamic,
+                     NullProjector second = NullProjector::kDynamic, double s = 0) {
   Case one(model, random);
-  one.projector = kind;
   const int n = one.n;
   Setpoint setpoint;
   setpoint.mode = Mode::kCartesian;
@@ -163,7 +163,10 @@ void expect_task_law(const RobotModel& model, Random& random,
   int held = 0;
   for (bool& direction : gains.directions) held += direction = random.integer(0, 4) > 0;
   if (held == 0) return;
-  const Impedance impedance(setpoint, n, kind);
+  gains.null_projector = second;
+  const Impedance after(setpoint, n);
+  gains.null_projector = kind;
+  const Impedance impedance = blend(Impedance(setpoint, n), after, s);
 
   // Rows of selected directions: S maps a twist in B's axes to their components.
   MatrixXd turn = MatrixXd::Identity(6, 6);
@@ -183,14 +186,15 @@ void expect_task_law(const RobotModel& model, Random& random,
                  C_C = held_only * gains.task_damping * held_only.transpose();
   const TipReference& path = one.references.tip;
   VectorXd tau = J.transpose() * (K_C * one.tip_error() + C_C * (path.velocity() - J * one.qd));
-  if (n > held || kind == NullProjector::kNone) {
-    MatrixXd inverse = MatrixXd::Zero(n, held);
-    if (kind == NullProjector::kDynamic) inverse = pseudo;
-    if (kind == NullProjector::kKinematic || kind == NullProjector::kWeighted) {
-      MatrixXd V = MatrixXd::Identity(n, n);
-      if (kind == NullProjector::kWeighted) V = one.weights.cwiseInverse().asDiagonal();
-      inverse = V * JS.transpose() * MatrixXd(JS * V * JS.transpose()).inverse();
-    }
+  if (impedance.null_space()) {
+    const double mass = impedance.share(NullProjector::kDynamic),
+                 none = impedance.share(NullProjector::kNone), rest_of = 1 - mass - none,
+                 given = impedance.share(NullProjector::kWeighted) / std::max(rest_of, 1e-3);
+    const VectorXd V = VectorXd::Constant(n, 1 - given) + given * one.weights.cwiseInverse();
+    const MatrixXd VJ = V.asDiagonal() * JS.transpose();
+    const MatrixXd B = JS * VJ;
+    if (Eigen::JacobiSVD<MatrixXd>(B).singularValues().reverse()[0] < 0.02 * B.norm()) return;
+    const MatrixXd inverse = mass * pseudo + rest_of * VJ * B.inverse();
     const MatrixXd projector = MatrixXd::Identity(n, n) - inverse * JS;
     const JointReference& rest = one.references.posture;
     VectorXd share = inverse * S * one.tip_error();
@@ -221,6 +225,11 @@ TEST(CartesianImpedance, IsItsEquation) {
     expect_task_law(rough_chain(random, 9), random, NullProjector::kWeighted);
     expect_task_law(testing::arm_model(testing::arms()[2]), random, NullProjector::kNone);
     expect_task_law(rough_chain(random, 9), random, NullProjector::kNone);
+    for (const auto& [a, first] : kNullProjectors) {
+      for (const auto& [b, second] : kNullProjectors) {
+        if (first < second) expect_task_law(rough_chain(random, 7), random, first, second, 0.4);
+      }
+    }
   }
 }
 
@@ -229,13 +238,13 @@ TEST(CartesianImpedance, DampsTheErrorOfTheTipsVelocityForTheRatioOfAllSprings) 
   Random random(327);
   for (int k = 0; k < 20; ++k) {
     Case one(rough_chain(random, 7), random);
-    one.projector = NullProjector::kNone;
     Setpoint setpoint;
     setpoint.mode = Mode::kCartesian;
     setpoint.gains = random_gains(random, 7);
     setpoint.gains.task_damping_ratio = setpoint.gains.null_damping_ratio = 0.7;
-    const Impedance impedance(setpoint, 7, one.projector);
-    NullSpace null_space(one.projector);
+    setpoint.gains.null_projector = NullProjector::kNone;
+    const Impedance impedance(setpoint, 7);
+    NullSpace null_space;
     null_space.compute(one.robot, impedance);
     if (null_space.inertia().nearly_singular()) continue;
     const JointVector& rest = one.references.posture.velocity();

@@ -2,6 +2,7 @@
 #include <dashpot/controller/law/gain_blend.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/led_arm.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 
@@ -10,11 +11,16 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
 
 namespace dashpot::controller {
 namespace {
 
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 using testing::near;
 using testing::Random;
 
@@ -202,6 +208,52 @@ TEST(GainBlend, FollowsTargetsThatComeEveryTick) {
     path.step();
   }
   EXPECT_TRUE(near(path.now(), Vector6(Vector6::Ones()), 1e-4));
+}
+
+/// The arm stands still, so that nothing but the blend changes the torque.
+TEST(ProjectorSwitch, EndsInTheLoopThatHadTheProjectorFromTheStart) {
+  const RobotModel model = testing::smooth_panda();
+  Settings settings = testing::in_mode(testing::unlimited_settings(model), Mode::kCartesian);
+  settings.null_weights = JointVector::LinSpaced(7, 0.3, 3);
+  settings.initial.gains.null_stiffness.setConstant(7, 40);
+  settings.initial.gains.null_damping.setConstant(7, 2);
+  const auto displaced = [&](NullProjector projector) {
+    settings.initial.gains.null_projector = projector;
+    auto led = std::make_unique<testing::LedArm>(model, settings);
+    led->settle();
+    led->place(led->center + JointVector(JointVector::LinSpaced(7, -0.05, 0.1)));
+    led->state.velocity.setConstant(0.05);
+    led->settle();
+    return led;
+  };
+  for (const auto& [from, first] : kNullProjectors) {
+    for (const auto& [to, second] : kNullProjectors) {
+      if (first == second) continue;
+      SCOPED_TRACE(std::string(from) + " to " + std::string(to));
+      const auto led = displaced(first), wanted = displaced(second);
+      const auto torque = [&] { return VectorXd(led->controller.snapshot().law_torque); };
+      const VectorXd before = torque();
+      led->setpoint.gains.null_projector = second;
+      double largest = 0;
+      const long ticks = std::lround(1000 * settings.motion.gain_time);
+      for (long k = 0; k <= ticks; ++k) {
+        const VectorXd last = torque();
+        led->tick();
+        largest = std::max(largest, (torque() - last).norm());
+      }
+      const double change = (torque() - before).norm();
+      EXPECT_GT(change, 0.2);
+      EXPECT_LT(largest, 5 * change / static_cast<double>(ticks));
+      EXPECT_TRUE(near(torque(), wanted->controller.snapshot().law_torque, 1e-9));
+      ASSERT_EQ(led->modes().count, 7);
+      for (int i = 0; i < 7; ++i) {
+        const VibrationMode &found = led->modes().modes[testing::at(i)],
+                            &known = wanted->modes().modes[testing::at(i)];
+        EXPECT_NEAR(found.natural_frequency, known.natural_frequency, 1e-8);
+        EXPECT_NEAR(found.damping_ratio, known.damping_ratio, 1e-8);
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST(PostureLoop, IsThatOfAControllerThere) {
     if (k % 5 == 0) gains.task_damping_ratio = gains.joint_damping_ratio = 0;
     settings.limits.gain_margin = k % 6 < 3 ? 1 : 2;
     settings.subtract_friction = k % 7 == 0;
-    settings.null_projector =
+    gains.null_projector =
         kNullProjectors[static_cast<std::size_t>(k) / 3 % kNullProjectors.size()].second;
     settings.null_weights = JointVector::LinSpaced(n, 0.3, 3);
     if (k % 4 == 1) settings.environment.tip_stiffness.setConstant(50);

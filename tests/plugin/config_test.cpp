@@ -286,7 +286,7 @@ TEST(Config, FillsTheRest) {
   EXPECT_EQ(all.environment.joint_stiffness, VectorXd::Constant(7, 8));
   EXPECT_EQ(all.environment.joint_damping, VectorXd::LinSpaced(7, 1, 7));
   EXPECT_TRUE(all.task_terms.jacobian_rate);
-  EXPECT_EQ(all.null_projector, controller::NullProjector::kWeighted);
+  EXPECT_EQ(all.initial.gains.null_projector, controller::NullProjector::kWeighted);
   EXPECT_EQ(all.null_weights, VectorXd::Constant(7, 2));
   EXPECT_TRUE(all.subtract_friction);
   EXPECT_EQ(all.motion.velocity, VectorXd::Ones(7));

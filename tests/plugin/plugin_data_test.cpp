@@ -237,6 +237,20 @@ TEST(FromC, ADampingRatioStandsInPlaceOfADamping) {
   EXPECT_EQ(gains.null_damping_ratio, 0);
 }
 
+TEST(FromC, AProjectorStaysUnlessAKnownOneIsGiven) {
+  Gains gains;
+  gains.null_projector = NullProjector::kWeighted;
+  dashpot_gains given = no_gains();
+  EXPECT_EQ(to_gains(&given, 2, gains), DASHPOT_OK);
+  EXPECT_EQ(gains.null_projector, NullProjector::kWeighted);
+  for (std::int32_t projector = -1; projector <= 4; ++projector) {
+    given.null_projector = &projector;
+    const bool known = projector >= 0 && projector < 4;
+    EXPECT_EQ(to_gains(&given, 2, gains), known ? DASHPOT_OK : DASHPOT_WRONG_VALUE);
+    if (known) EXPECT_EQ(static_cast<std::int32_t>(gains.null_projector), projector);
+  }
+}
+
 TEST(ToC, ASnapshotHasAllThatIsInIt) {
   Numbers numbers;
   Snapshot snapshot;

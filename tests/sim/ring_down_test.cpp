@@ -27,7 +27,6 @@ struct ReleasedTwin {
   controller::Gains gains;
   analysis::SampledLoop loop;
   const controller::Attachment* told = nullptr;
-  controller::NullProjector projector = controller::NullProjector::kDynamic;
 
   ReleasedTwin(const TwinModels& models, Random& generator, bool hold_posture)
       : twin(models), random(generator), q0(random_posture(models, generator)) {
@@ -53,7 +52,6 @@ struct ReleasedTwin {
   /// published modes, continuous or sampled.
   void compare(bool sampled, int ticks, int every, Worst& worst) {
     controller::Settings settings = release_settings(twin, gains, loop.period);
-    settings.null_projector = projector;
     settings.null_weights = JointVector::LinSpaced(twin.dof(), 0.3, 3);
     sim::PlantOptions options;
     options.delay = loop.delay;
@@ -147,7 +145,7 @@ TEST_P(RingDown, HasTheModesOfTheSampledLoopWithOtherProjectors) {
       SCOPED_TRACE(std::string(name) + ", seed " + std::to_string(seed));
       Random random(static_cast<std::uint64_t>(seed));
       ReleasedTwin scene = scene_of(seed, random);
-      scene.projector = projector;
+      scene.gains.null_projector = projector;
       if (twin.dof() == 6) scene.gains.null_stiffness.setConstant(6, 10);
       scene.gains.null_stiffness *= 8;  // enough to move the modes of the tip
       if (none && seed == 4) scene.gains.task_damping_ratio = scene.gains.null_damping_ratio = 0.3;
