@@ -87,7 +87,7 @@ def test_modes_after_a_switch_of_the_projector_are_those_of_the_motion(root, pro
             before = loop.controller.modes().natural_frequency
             loop.controller.set_gains(null_projector=projector)
         loop.tick()
-    assert abs(loop.controller.modes().natural_frequency / before - 1).max() > 0.02
+    assert abs(loop.controller.modes().natural_frequency / before - 1).max() > 0.01
     expect_modes_of_motion(loop, projector)
 
 
