@@ -16,12 +16,15 @@ struct Touch {
   double damping = 0;         ///< b, N s/m, at least 0
   double mass = 0;            ///< m, kg, at least 0
   double most = 1e9;          ///< stiffness up to which a limit is looked for, N/m
+  /// N/m, up to which it is looked for in steps of a factor of 16. If there is none, the touch
+  /// against a rigid world is then not looked at.
+  double coarse = 0;
   double stiffness_share = 1, damping_share = 1;  ///< factors of the controller's K - P and C - D
 };
 
 /// The stiffness k of a touch at which a sampled loop loses its stability.
 struct ContactLimit {
-  /// N/m: the first boundary above 0 to six digits, found in steps of at most a factor of 1.6 and
+  /// N/m: the first boundary above 0 to six digits, found in steps of at most a factor of 2.25 and
   /// finer ones where the least ratio has a minimum or the touch turns by a multiple of pi in a
   /// tick; 0 if the loop is unstable before it touches, infinite if there is no boundary up to
   /// Touch::most.

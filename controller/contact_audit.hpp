@@ -53,9 +53,9 @@ struct ContactAudit {
 std::vector<Eigen::Vector3d> contact_directions();
 
 /// Returns the limit at q (n, rad) without proved bounds. Without a direction in the options, it is
-/// the least of contact_directions. Throws like Audit::numbers, and
-/// std::invalid_argument without a period, for what ContactOptions does not allow, and for a
-/// direction in which the tip cannot move.
+/// the least of contact_directions, of which all but the lightest are searched in coarse steps.
+/// Throws like Audit::numbers, and std::invalid_argument without a period, for what ContactOptions
+/// does not allow, and for a direction in which the tip cannot move.
 ContactAt find_contact(const Audit& audit, const JointVector& q, const ContactOptions& options);
 
 /// Returns the limit of a touch at q, with a proved bracket, and the forces that the joints can

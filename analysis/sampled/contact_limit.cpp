@@ -13,13 +13,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The damping ratio of a motion z; negative if it grows.
-double ratio_of(Complex z) {
-  if (z == 0.0) return 1;
-  const Complex lambda = std::log(z);
-  return -lambda.real() / std::max(modulus(lambda), kEps);
-}
-
 /// A loop that touches something, with the stiffness of the touch as the parameter.
 class TouchedLoop {
  public:
@@ -32,6 +25,11 @@ class TouchedLoop {
     a_ = period_ * mass.matrixL().solve(touch.direction);
     free_.K = free_.P + touch.stiffness_share * (free_.K - free_.P);
     free_.C = free_.D + touch.damping_share * (free_.C - free_.D);
+    touched_ = free_;
+    free_.touch(VectorXd::Zero(a_.size()));
+    touched_.touch(a_);
+    units_[0] = free_.unit_motions();
+    units_[1] = touched_.unit_motions();
   }
 
   /// Returns the stiffness with which the touch alone makes the arm move at `omega` rad/s.
@@ -46,23 +44,24 @@ class TouchedLoop {
   /// Whether the state is too large for its eigenvalues.
   bool counted() const { return free_.rows() > kDenseRows; }
   SampledDataModel pressed(double stiffness) const {
-    SampledDataModel model = free_;
+    SampledDataModel model = stiffness > 0 ? touched_ : free_;
     model.press(a_, stiffness);
     return model;
   }
-  Trial solve(double stiffness) const { return solve(pressed(stiffness), stiffness); }
+  Trial solve(double stiffness) const {
+    return solve(pressed(stiffness), units_[stiffness > 0 ? 1 : 0], stiffness);
+  }
   /// The loop is stable if the excess is negative.
   Trial at(double stiffness) const {
-    const SampledDataModel model = pressed(stiffness);
-    if (!counted()) return solve(model, stiffness);
-    return {stiffness, CircleCount(model, slowest_).excess(1)};
+    if (!counted()) return solve(stiffness);
+    return {stiffness, CircleCount(pressed(stiffness), slowest_).excess(1)};
   }
   bool stable_if_rigid() const {
     SampledDataModel model = free_;
     model.hold(a_);
     if (model.n == 0) return true;
     if (model.rows() > kDenseRows) return CircleCount(model, slowest_).excess(1) < 0;
-    return solve(model, 0).excess < 0;
+    return solve(model, model.unit_motions(), 0).excess < 0;
   }
   /// Whether the count of all eigenvalues proves the verdict, with none too near to the circle.
   bool proves(double stiffness, bool stable) const {
@@ -79,8 +78,10 @@ class TouchedLoop {
     require("contact", touch.direction.size() == system.dof() && touch.direction.allFinite(),
             "direction has to have n finite entries");
     require("contact", !touch.direction.isZero(0), "direction must not be zero");
-    for (const auto& [name, value] :
-         {std::pair("damping", touch.damping), {"mass", touch.mass}, {"most", touch.most}}) {
+    for (const auto& [name, value] : {std::pair("damping", touch.damping),
+                                      {"mass", touch.mass},
+                                      {"most", touch.most},
+                                      {"coarse", touch.coarse}}) {
       require("contact", std::isfinite(value) && value >= 0,
               std::string(name) + " must be finite and not negative");
     }
@@ -94,26 +95,31 @@ class TouchedLoop {
     loop.friction = added(loop.friction, touch.damping, touch);
     return loop;
   }
-  Trial solve(const SampledDataModel& model, double stiffness) const {
-    MatrixXd A = model.on_other_motions(model.transition());
+  Trial solve(const SampledDataModel& model, const MatrixXd& units, double stiffness) const {
+    MatrixXd A = model.on_other_motions(model.transition(), units);
     return Trial::solve(stiffness, A, slowest_);
   }
 
   double period_, slowest_;
-  SampledDataModel free_;
-  VectorXd a_;  ///< a' y T is the deflection of the touch, y in the coordinates of free_
+  SampledDataModel free_, touched_{free_};
+  MatrixXd units_[2];  ///< SampledDataModel::unit_motions of the two
+  VectorXd a_;         ///< a' y T is the deflection of the touch, y in the coordinates of free_
 };
 
-/// The least damped motion of a trial.
+/// The least damped motion of a trial; a ratio is negative if the motion grows.
 ContactPoint point_of(const Trial& trial, double period) {
   ContactPoint point{trial.factor, 1, 0};
   for (const Complex z : trial.values) {
-    const double ratio = ratio_of(z);
-    if (ratio >= point.damping_ratio || z == 0.0) continue;
-    point.damping_ratio = ratio;
-    point.natural_frequency = modulus(std::log(z)) / period;
+    if (z == 0.0) continue;
+    const Complex lambda(0.5 * std::log(std::norm(z)), std::arg(z));  // faster than std::log(z)
+    const double ratio = -lambda.real() / std::max(modulus(lambda), kEps);
+    if (ratio < point.damping_ratio) point = {trial.factor, ratio, modulus(lambda) / period};
   }
   return point;
+}
+
+double least_ratio(const Trial& trial) {
+  return point_of(trial, 1).damping_ratio;
 }
 
 /// Looks for an unstable stiffness where the least ratio has its minimum between trials, by
@@ -121,13 +127,10 @@ ContactPoint point_of(const Trial& trial, double period) {
 Trial look_between(const TouchedLoop& loop, double low, double high) {
   constexpr double kGolden = 0.381966;
   constexpr int kLooks = 5;
-  const auto ratio = [&](const Trial& trial) {
-    return point_of(trial, loop.period()).damping_ratio;
-  };
   Trial a = loop.at(low * std::pow(high / low, kGolden));
   Trial b = loop.at(low * std::pow(high / low, 1 - kGolden));
   for (int i = 0; i < kLooks && a.excess < 0 && b.excess < 0; ++i) {
-    if (ratio(a) < ratio(b)) {
+    if (least_ratio(a) < least_ratio(b)) {
       high = b.factor;
       b = a;
       a = loop.at(low * std::pow(high / low, kGolden));
@@ -190,12 +193,14 @@ double first_boundary(const TouchedLoop& loop, Trial inside, const Trial& outsid
   return found;
 }
 
-/// Returns the next stiffness that is tried: 1.6 times the last one, or less where that takes the
-/// touch further than a turn of `kMostTurn` rad a tick.
-double next_stiffness(const TouchedLoop& loop, double last, double first) {
+/// Returns the next stiffness that is tried: kCoarse times the last one up to `coarse`, then 2.25
+/// times, or less where that takes the touch further than a turn of `kMostTurn` rad a tick.
+double next_stiffness(const TouchedLoop& loop, double last, double first, double coarse) {
+  constexpr double kCoarse = 16;
   constexpr double kMostTurn = 0.5;  // rad
-  constexpr double kRatio = 1.26;    // factor on the frequency of the touch
+  constexpr double kRatio = 1.5;     // factor on the frequency of the touch
   if (last < first) return first;
+  if (last < coarse) return std::min(kCoarse * last, std::max(coarse, first));
   const double turn = std::sqrt(last / loop.stiffness_at(1 / loop.period()));
   const double next = std::min(kRatio * turn, turn + kMostTurn);
   return last * (next / turn) * (next / turn);
@@ -206,20 +211,15 @@ void find_limit(const TouchedLoop& loop, const Touch& touch, ContactLimit& resul
   constexpr double kSlowTouch = 3;     // rad/s, with which the search begins
   constexpr double kSmallRatio = 0.1;  // below which a minimum between trials may be below zero
   const double first = loop.stiffness_at(kSlowTouch);
-  std::array<Trial, 2> before{loop.at(0), {-1, 0}};
-  result.stiffness = kInfinity;
-  if (!(before[0].excess < 0)) {
-    result.stiffness = 0;
-    return;
-  }
-  const auto ratio = [&](const Trial& trial) {
-    return point_of(trial, loop.period()).damping_ratio;
-  };
-  while (before[0].factor < touch.most) {
-    Trial here = loop.at(std::min(touch.most, next_stiffness(loop, before[0].factor, first)));
+  std::array<Trial, 2> before{loop.at(touch.coarse > 0 ? first : 0), {-1, 0}};
+  if (!(before[0].excess < 0) && touch.coarse > 0) before[0] = loop.at(0);
+  result.stiffness = before[0].excess < 0 ? kInfinity : 0;
+  while (result.stiffness > 0 && before[0].factor < touch.most) {
+    Trial here =
+        loop.at(std::min(touch.most, next_stiffness(loop, before[0].factor, first, touch.coarse)));
     if (here.excess < 0 && before[1].factor > 0 && before[0].values.size() > 0) {
-      const double middle = ratio(before[0]);
-      if (middle < kSmallRatio && middle < ratio(before[1]) && middle <= ratio(here)) {
+      const double middle = least_ratio(before[0]);
+      if (middle < kSmallRatio && middle < least_ratio(before[1]) && middle <= least_ratio(here)) {
         Trial found = look_between(loop, before[1].factor, here.factor);
         if (!(found.excess < 0)) {
           here = found;
@@ -279,8 +279,9 @@ ContactLimit contact_limit(const System<>& system, const Spectrum<>& spectrum,
   const TouchedLoop touched(system, spectrum, loop, touch);
   ContactLimit result;
   find_limit(touched, touch, result);
-  result.stable_if_rigid = touched.stable_if_rigid();
-  if (!(result.stiffness > 0) || std::isinf(result.stiffness)) {
+  const bool none = std::isinf(result.stiffness);
+  result.stable_if_rigid = !(none && touch.coarse > 0) && touched.stable_if_rigid();
+  if (!(result.stiffness > 0) || none) {
     result.lower = result.upper = result.stiffness;
     return result;
   }

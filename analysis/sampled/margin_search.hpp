@@ -24,7 +24,8 @@ struct Trial {
     Trial trial{factor, 0, eigenvalues_of(A)};
     Eigen::Index count = 0;
     for (const Complex z : Eigen::VectorXcd(trial.values)) {
-      if (slowest > 0 && z != 0.0 && modulus(std::log(z)) < slowest) continue;
+      const bool near = slowest > 0 && modulus(z - 1.0) < std::expm1(slowest);
+      if (near && z != 0.0 && modulus(std::log(z)) < slowest) continue;
       trial.values[count++] = z;
       trial.excess = std::max(trial.excess, modulus(z));
     }

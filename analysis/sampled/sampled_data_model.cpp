@@ -194,7 +194,7 @@ void SampledDataModel::integrate() {
   motion = motion_of_tick(G, D);
 }
 
-void SampledDataModel::touch_zero_modes(const Eigen::VectorXd& a) {
+void SampledDataModel::touch(const Eigen::VectorXd& a) {
   const Index r = zero_modes.cols();
   if (r == 0) return;
   const Eigen::HouseholderQR<MatrixXd> qr(zero_modes);  // another mass may have made it oblique
@@ -206,13 +206,12 @@ void SampledDataModel::touch_zero_modes(const Eigen::VectorXd& a) {
 }
 
 void SampledDataModel::press(const Eigen::VectorXd& a, double stiffness) {
-  touch_zero_modes(stiffness > 0 ? a : Eigen::VectorXd::Zero(n));
   for (MatrixXd* spring : {&G, &K, &P}) *spring += stiffness * a * a.transpose();
-  integrate();
+  motion = motion_of_tick(G, D);  // the commands are the same
 }
 
 void SampledDataModel::hold(const Eigen::VectorXd& a) {
-  touch_zero_modes(a);
+  touch(a);
   const Eigen::HouseholderQR<MatrixXd> qr(a);
   const MatrixXd Q = MatrixXd(qr.householderQ()).rightCols(--n);
   for (MatrixXd* part : {&C, &K, &D, &G, &P, &H}) *part = Q.transpose() * *part * Q;
@@ -290,8 +289,7 @@ MatrixXd SampledDataModel::unit_motions() const {
   return X;
 }
 
-MatrixXd SampledDataModel::on_other_motions(MatrixXd A) const {
-  const MatrixXd X = unit_motions();
+MatrixXd SampledDataModel::on_other_motions(MatrixXd A, const MatrixXd& X) {
   if (X.cols() == 0) return A;
   const Eigen::HouseholderQR<MatrixXd> qr(X);
   A.applyOnTheLeft(qr.householderQ().adjoint());

@@ -5,6 +5,8 @@
 #include <dashpot/analysis/sampled/sampled_spectrum.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 
+#include <utility>
+
 namespace dashpot::analysis {
 
 /// The loop in coordinates y = L' q (M = L L'), or in the coordinates of an elastic form, with
@@ -46,7 +48,10 @@ struct SampledDataModel {
   /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), u and f by their coordinates
   /// in `commands`, with `factor` times K - P, C - D and the output of w; see sample_loop.
   Eigen::MatrixXd transition(double factor = 1) const;
-  /// Adds a spring of the world, `stiffness` a a' with the direction a (n, in these coordinates).
+  /// Leaves the zero modes with a' y = 0, orthonormal.
+  void touch(const Eigen::VectorXd& a);
+  /// Adds a spring of the world, `stiffness` a a' with the direction a (n, in these coordinates),
+  /// to a model whose zero modes it does not touch.
   void press(const Eigen::VectorXd& a, double stiffness);
   /// Leaves the motions with a' y = 0 alone.
   void hold(const Eigen::VectorXd& a);
@@ -54,7 +59,10 @@ struct SampledDataModel {
   /// positions, with the compensated gravity in the memory, and velocities that nothing damps.
   Eigen::MatrixXd unit_motions() const;
   /// Returns A (rows() x rows()) on the orthogonal complement of unit_motions().
-  Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A) const;
+  Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A) const {
+    return on_other_motions(std::move(A), unit_motions());
+  }
+  static Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A, const Eigen::MatrixXd& units);
   /// Returns all eigenvalues of A outside unit_motions(), then the eigenvalues of a delay and a
   /// filter of the n - r commands that are always zero. Throws std::runtime_error.
   Eigen::VectorXcd discrete_eigenvalues() const;
@@ -67,8 +75,6 @@ struct SampledDataModel {
   void remember(const SampledLoop& loop, const Eigen::MatrixXd& coordinates);
   /// Sets `motion` and `commands`. Drops zero modes in which gravity is not compensated.
   void integrate();
-  /// Leaves the zero modes with a' y = 0, orthonormal.
-  void touch_zero_modes(const Eigen::VectorXd& a);
   void span_commands();
 };
 

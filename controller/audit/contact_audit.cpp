@@ -3,6 +3,7 @@
 #include <dashpot/controller/dynamics.hpp>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -19,7 +20,9 @@ using Eigen::VectorXd;
 class TouchingTip {
  public:
   TouchingTip(const Audit& audit, const JointVector& q, const ContactOptions& options)
-      : options_(options), loop_(audit.at(q)), spectrum_(analysis::analyze(loop_.system)) {
+      : options_(options),
+        loop_(audit.at(q)),
+        spectrum_(analysis::analyze(loop_.system, kZeroModes)) {
     require(audit.options().period > 0, "period: a loop needs one");
     for (const auto& [name, value] :
          {std::pair("damper", options.damping), {"mass", options.mass}}) {
@@ -42,8 +45,10 @@ class TouchingTip {
   /// Returns true if a force at the tip moves it in a direction.
   bool moves(const Vector3d& n) const {
     constexpr double kStuck = 1e-6;  // of the mobility in the three axes together
-    return n.dot(mobility_ * n) > kStuck * mobility_.trace();
+    return mobility(n) > kStuck * mobility_.trace();
   }
+  /// Returns the acceleration of the tip in a direction from a force of 1 N there.
+  double mobility(const Vector3d& n) const { return n.dot(mobility_ * n); }
   /// Returns a of x = a' q, in the loop's coordinates.
   VectorXd reach(const Vector3d& n) const {
     VectorXd a = VectorXd::Zero(loop_.system.dof());
@@ -60,8 +65,10 @@ class TouchingTip {
   /// Takes a direction with a smaller limit than the best so far. Returns whether it is smaller.
   bool take_if_worse(const Vector3d& n, ContactAt& best) const {
     if (!moves(n)) return false;
+    constexpr double kOctaves = 0.4;  // of the limit, from where a smaller one is looked for
     Touch here = touch(n);
     here.most = std::min(here.most, best.limit.stiffness);
+    if (std::isfinite(best.limit.stiffness)) here.coarse = kOctaves * best.limit.stiffness;
     const ContactLimit found = limit(here);
     if (!(found.stiffness < best.limit.stiffness)) return false;
     best = {n, found};
@@ -69,6 +76,8 @@ class TouchingTip {
   }
 
  private:
+  static constexpr analysis::SpectrumOptions kZeroModes{
+      .residual = analysis::SpectrumOptions::Residual::kWorking};  // bounds are not used here
   ContactOptions options_;
   LoopAt loop_;
   analysis::Spectrum<> spectrum_;
@@ -79,7 +88,11 @@ class TouchingTip {
 ContactAt worst_of_thirteen(const TouchingTip& tip) {
   ContactAt best;
   best.limit.stiffness = std::numeric_limits<double>::infinity();
-  for (const Vector3d& n : contact_directions()) {
+  std::vector<Vector3d> directions = contact_directions();
+  std::sort(directions.begin(), directions.end(), [&](const Vector3d& a, const Vector3d& b) {
+    return tip.mobility(a) > tip.mobility(b);  // the lightest first: others are then seen quickly
+  });
+  for (const Vector3d& n : directions) {
     if (best.direction.isZero() && tip.moves(n)) best.direction = n;
     tip.take_if_worse(n, best);
   }
