@@ -20,7 +20,7 @@
 namespace dashpot::apps {
 namespace {
 
-constexpr std::size_t kMostArms = 8;
+constexpr std::size_t kMostKept = 8;
 constexpr const char* kPaper = "the paper's Discussion, C_C1";
 
 HttpAnswer answer_of(unsigned status, const Json& document) {
@@ -162,7 +162,7 @@ const TunedArm& TuneSite::arm_of(const Json& design) {
   const std::string parts = line_of(design["arm"]);
   const auto found = arms_.find(parts);
   if (found != arms_.end()) return found->second;
-  if (arms_.size() >= kMostArms) arms_.clear();
+  if (arms_.size() >= kMostKept) arms_.clear();
   return arms_.emplace(parts, arm_.with(design["arm"])).first->second;
 }
 
@@ -181,7 +181,11 @@ Json TuneSite::answer(const std::string& path, const Json& asked) {
   const controller::JointVector q = posture(wanted(asked, "q"), arm.model());
   const TunedLoop loop(arm, design);
   Json result = loop.at(q, place.get<std::string>());
-  if (asked.contains("touches")) result["contact"] = loop.contact(q, touched(asked["touches"]));
+  if (asked.contains("touches")) {
+    const std::string where = line_of(told) + line_of(asked["q"]);
+    if (contacts_.size() >= kMostKept && !contacts_.contains(where)) contacts_.clear();
+    result["contact"] = loop.contact(q, touched(asked["touches"]), contacts_[where]);
+  }
   result["refused"] = refusals(arm, design, q);
   result["warned"] = warnings(arm, design);
   return result;

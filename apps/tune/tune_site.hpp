@@ -1,10 +1,12 @@
 #pragma once
 #include <dashpot/apps/tune/tuned_design.hpp>
 #include <dashpot/apps/web/http_server.hpp>
+#include <dashpot/controller/contact_audit.hpp>
 
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +47,8 @@ class TuneSite {
   TuneStart start_;
   std::string token_;
   std::map<std::string, TunedArm> arms_;  ///< by their parts
+  /// By design and posture: the slider of the stiffness changes neither.
+  std::map<std::string, std::optional<controller::ContactAt>> contacts_;
 };
 
 }  // namespace dashpot::apps

@@ -3,7 +3,6 @@
 #include <dashpot/apps/tune/place_motion.hpp>
 #include <dashpot/apps/tune/tuned_loop.hpp>
 #include <dashpot/apps/web/receptance.hpp>
-#include <dashpot/controller/contact_audit.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/posture.hpp>
@@ -246,18 +245,19 @@ nlohmann::ordered_json TunedLoop::workspace(std::uint64_t seed, std::int64_t fir
   return result;
 }
 
-nlohmann::ordered_json TunedLoop::contact(const JointVector& q, double stiffness) const {
+nlohmann::ordered_json TunedLoop::contact(const JointVector& q, double stiffness,
+                                          std::optional<controller::ContactAt>& least) const {
   if (design_.stated.period == 0) return nullptr;
   try {
     controller::ContactOptions options;
-    const controller::ContactAt least = controller::find_contact(audit_, q, options);
-    options.direction = least.direction;
+    if (!least) least = controller::find_contact(audit_, q, options);
+    options.direction = least->direction;
     const auto point = controller::contact_curve(audit_, q, options, {stiffness})[0];
     return {{"stiffness", stiffness},
-            {"direction", json_list(least.direction)},
+            {"direction", json_list(least->direction)},
             {"damping_ratio", point.damping_ratio},
             {"natural_frequency", point.natural_frequency},
-            {"limit", std::min(least.limit.stiffness, options.most)}};
+            {"limit", std::min(least->limit.stiffness, options.most)}};
   } catch (const std::exception&) {  // a tip that is stuck, no convergence
     return nullptr;
   }

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/apps/tune/tuned_design.hpp>
+#include <dashpot/controller/contact_audit.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 
 #include <chrono>
@@ -22,8 +23,9 @@ class TunedLoop {
 
   /// Returns the effect of touching a spring of this stiffness (N/m), in the direction with the
   /// least limit: {"stiffness", "direction", "damping_ratio", "natural_frequency", "limit"}; 1e9:
-  /// no limit. Null without a period, and if the tip cannot move.
-  nlohmann::ordered_json contact(const controller::JointVector& q, double stiffness) const;
+  /// no limit. Null without a period, and if the tip cannot move. Sets `least` where it is empty.
+  nlohmann::ordered_json contact(const controller::JointVector& q, double stiffness,
+                                 std::optional<controller::ContactAt>& least) const;
 
   /// Returns the numbers of postures of the sequence `seed`, computed by one thread for each
   /// processor, and the postures at which either number is the worst:

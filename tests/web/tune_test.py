@@ -511,6 +511,33 @@ class Tune(unittest.TestCase):
         self.browser.until('early.length > 2')
         self.assertEqual(self.value('early.filter(Boolean).length'), 0)
 
+    def test_slider_of_a_touch_shows_the_verdict_of_contact(self):
+        totals = '''Object.fromEntries($$('#totals tr').map((r) =>
+            [...r.children].map((e) => e.textContent).slice(0, 2)))'''
+        self.assertNotIn('least ratio, touching', self.value(totals))
+        self.edit("""Object.assign(state.a, {stiffness: [600, 600, 600, 30, 30, 30], damping: {factor: 2}, delay: 3,
+            arm: {reflected_inertia: Array(7).fill(0.3), viscous_friction: Array(7).fill(0.003)}})""")
+        for place, bad in ((267, 0), (400, 1)):  # 1e4 and 1e6 N/m
+            self.set('#touch input[type=range]', place, 'input')
+            k, q, direction = (self.value(f'dashpot.{key}') for key in
+                               ('state.touches', 'state.q', 'answers.a.contact.direction'))
+            told = json.loads(run('contact', '--urdf', 'sim/models/panda.urdf', '--base', 'panda_link0', '--tip',
+                                  'panda_hand_tcp', '--stiffness', '600,600,600,30,30,30', '--damping-factor', '2',
+                                  '--null-damping', ','.join(7 * '0'), '--reflected-inertia', '0.3',
+                                  '--viscous-friction', '0.003', '--delay', '3', '--json', '--touch', str(k),
+                                  '--q=' + ','.join(map(repr, q)), '--direction=' + ','.join(map(repr, direction))))
+            [ratio] = [point[1] for point in told['posture']['curve'] if abs(point[0] - k) < 1e-6 * k]
+            found = self.value(totals)
+            limit = told['posture']['limit']
+            self.assertAlmostEqual(self.value('dashpot.answers.a.contact.limit') / limit, 1, 6)
+            [text] = [text for name, text in found.items() if 'up to' in name]
+            self.assertEqual(float(text), float(f'{limit:.1e}'))
+            self.assertEqual(found['least ratio, touching'], shown(ratio))
+            self.assertIn(f"A: lowest limit along ({', '.join(shown(x, 2) for x in direction)})",
+                          self.value("$('#limits').textContent"))
+            self.assertEqual(self.value("$$('#totals td:nth-child(2).bad').length"), bad)
+            self.assertEqual(told['asked']['stable'], not bad)
+
     def test_discussion_of_the_paper_by_hand(self):
         # From C_C0 = I to ratios above 0.6 for all six modes, by one click, as docs/first-hour.md has it.
         with open(os.path.join(SOURCE, 'docs/first-hour.md')) as file:
