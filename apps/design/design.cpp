@@ -263,9 +263,6 @@ RegionReport search_region(const SystemFile& file, const DesignOptions& options)
     RegionReport report{key_of(configurations[0]), options.ratio,
                         analysis::design_region(configurations, region)};
     if (options.timing.period > 0) report.limit = limit_of(file.entries[0], options);
-    if (report.limit && options.contact > 0) {
-      report.sampled_ratio = sampled_ratio(file, options, report.design.damping);
-    }
     return report;
   } catch (const analysis::InvalidSystem&) {
     for (const SystemEntry& entry : file.entries) report_on(entry, options);  // names the entry
@@ -277,8 +274,11 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
                               const std::optional<controller::RobotModel>& model,
                               const std::vector<JointVector>& postures) {
   const auto search = [&](const SystemFile& all) { return search_region(all, options); };
+  const auto ratio = [&](const SystemFile& all, const Eigen::MatrixXd& damping) {
+    return options.timing.period > 0 ? sampled_ratio(all, options, damping) : 0;
+  };
   RegionReport report = options.contact > 0
-                            ? design_for_contact(options, file, *model, postures, search)
+                            ? design_for_contact(options, file, *model, postures, search, ratio)
                             : search(file);
   if (report.postures.empty()) report.postures = postures;
   const analysis::RegionDesign& design = report.design;

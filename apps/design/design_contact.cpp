@@ -59,7 +59,7 @@ SystemFile against(double most, const DesignOptions& options, const SystemFile& 
 RegionReport design_for_contact(const DesignOptions& options, const SystemFile& air,
                                 const controller::RobotModel& model,
                                 const std::vector<JointVector>& postures,
-                                const RegionSearch& search) {
+                                const RegionSearch& search, const SampledRatio& ratio) {
   constexpr double kNear = 1.03, kLeast = 1;  // of the stiffness that is sought; N/m
   std::vector<MatrixXd> J;
   J.reserve(postures.size());
@@ -77,11 +77,10 @@ RegionReport design_for_contact(const DesignOptions& options, const SystemFile& 
     return found;
   };
   RegionReport best = design(options.contact);
-  if (holds(best)) return best;
-  best = design(0);
-  if (!holds(best)) return best;
-  for (double high = options.contact; high > kNear * best.contact.value_or(0) && high > kLeast;) {
-    const double low = best.contact.value_or(0);
+  if (!holds(best)) best = design(0);
+  for (double high = options.contact;
+       best.contact && high > kNear * *best.contact && high > kLeast;) {
+    const double low = *best.contact;
     const double middle = low > 0 ? std::sqrt(low * high) : 0.1 * high;
     RegionReport found = design(middle);
     if (holds(found)) {
@@ -90,6 +89,9 @@ RegionReport design_for_contact(const DesignOptions& options, const SystemFile& 
       high = middle;
     }
   }
+  RegionReport again;
+  const double most = best.contact.value_or(0);
+  best.sampled_ratio = ratio(against(most, options, air, J, postures, again), best.design.damping);
   return best;
 }
 
