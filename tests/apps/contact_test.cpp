@@ -36,7 +36,7 @@ TEST(ContactOfAnArm, IsLeastInTheDirectionThatIsFound) {
   const double limit = least["limit"];
   EXPECT_LT(least["limit_lower"], limit);
   EXPECT_GT(least["limit_upper"], limit);
-  for (const char* direction : {"x", "y", "z", "1,1,1", "-1,0.4,0.2"}) {
+  for (const char* direction : {"x", "y", "z", "1,1,1", "-1,0.4,0.2", "-1,5,-1"}) {
     const Json other = contact({"--drives", "panda", "--direction", direction})["posture"];
     EXPECT_LE(limit, 1.0001 * other["limit"].get<double>()) << direction;
   }
@@ -49,13 +49,44 @@ TEST(ContactOfAnArm, IsLeastInTheDirectionThatIsFound) {
   }
 }
 
+TEST(ContactOfAnArm, ShowsWhatWouldHelpAndWhatIsTouched) {
+  const auto of = [](const std::string& stiffness, const std::string& damping, const Words& more) {
+    const Words gains = {"--drives",  "panda",          "--stiffness",  stiffness,
+                         "--damping", damping,          "--json",       "--direction",
+                         "z",         "--null-damping", "0,0,0,0,0,0,0"};
+    return parse(run_program(of_panda("contact", joined(joined(kHome, gains), more))))["posture"];
+  };
+  const auto expect_same = [](const Json& a, const Json& b) {
+    EXPECT_NEAR(a.get<double>(), b.get<double>(), 1e-5 * b.get<double>());
+  };
+  const std::string K = "600,600,600,30,30,30", C = "40,40,40,4,4,4";
+  const Json found = of(K, C, {"--delay", "1"});
+  expect_same(found["with_half_stiffness"],
+              of("300,300,300,15,15,15", C, {"--delay", "1"})["limit"]);
+  expect_same(found["with_more_damping"], of(K, "60,60,60,6,6,6", {"--delay", "1"})["limit"]);
+  expect_same(found["with_less_delay"], of(K, C, {})["limit"]);
+  const double limit = found["limit"];
+  EXPECT_GT(of(K, C, {"--delay", "1", "--damper", "10"})["limit"], 1.01 * limit);
+  EXPECT_GT(of(K, C, {"--delay", "1", "--mass", "1"})["limit"], 1.05 * limit);
+}
+
+/// Each joint's torque beside the effort of the arm that presses up or down.
 TEST(ContactOfAnArm, HoldsWhatTheJointsGive) {
   const Json hold = contact({"--direction", "z"})["posture"]["hold"];
+  const Rows jacobian =
+      parse(run_program(of_panda("inspect", joined(kHome, {"--json"}))))["jacobian"];
   const Numbers torque = hold["torque"], limit = hold["limit"];
   for (const Json& one : hold["forces"]) {
     const std::size_t joint = one["joint"];
     EXPECT_GT(one["force"], 0);
-    EXPECT_LT(std::abs(torque[joint]), limit[joint]);
+    for (std::size_t i = 0; i < torque.size(); ++i) {
+      double together = torque[i];
+      for (std::size_t k = 0; k < 3; ++k) {
+        together += jacobian[k][i] * one["direction"][k].get<double>() * one["force"].get<double>();
+      }
+      EXPECT_LT(std::abs(together), limit[i] + 1e-9);
+      if (i == joint) EXPECT_NEAR(std::abs(together), limit[i], 1e-9);
+    }
   }
   const double up = hold["forces"][0]["force"], down = hold["forces"][1]["force"];
   EXPECT_EQ(up, hold["forces"][6]["force"]);

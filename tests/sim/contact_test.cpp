@@ -130,6 +130,29 @@ TEST(Contact, MassesTurnWhereTheLimitIs) {
   EXPECT_GE(compared, 18);
 }
 
+/// The coarse steps in all directions but the first miss no lower limit.
+TEST(Contact, DirectionFoundIsTheLowestOfThirteen) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    Random random(seed);
+    const TouchedPanda panda(random, static_cast<int>(seed % 4), false);
+    const controller::Audit audit(panda.model(), panda.stated);
+    controller::ContactOptions options;
+    options.damping = random.integer(0, 1) * random.log_uniform(1, 100);
+    options.mass = random.integer(0, 1) * random.log_uniform(0.1, 3);
+    const double found = find_contact(audit, panda.q, options).limit.stiffness;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector3d& n : controller::contact_directions()) {
+      options.direction = n;
+      least = std::min(least, find_contact(audit, panda.q, options).limit.stiffness);
+    }
+    if (std::isfinite(found + least)) {
+      EXPECT_NEAR(found, least, 1e-5 * least);
+    } else {
+      EXPECT_EQ(found, least);
+    }
+  }
+}
+
 /// A Panda without gravity whose tip is pressed into a wall a hundredth of a millimetre deep by a
 /// constant torque.
 struct PressedArm {

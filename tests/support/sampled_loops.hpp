@@ -9,7 +9,7 @@
 
 namespace dashpot::testing {
 
-inline analysis::System<> random_system(Random& random, Eigen::Index n) {
+inline analysis::System<> random_system(Dice& random, Eigen::Index n) {
   analysis::System<> system(n);
   system.mass = random.spd(n);
   system.stiffness = 1000 * random.spd(n);
@@ -22,7 +22,7 @@ inline analysis::SampledSpectrum sample(const analysis::System<>& system,
   return sample_loop(system, analysis::analyze(system), loop);
 }
 
-inline analysis::SampledLoop random_loop(Random& random) {
+inline analysis::SampledLoop random_loop(Dice& random) {
   analysis::SampledLoop loop;
   loop.period = random.log_uniform(1e-4, 5e-3);
   loop.delay = random.integer(0, 3);
