@@ -87,7 +87,6 @@ class GoalFollower {
   /// Reads the goals, without the place where the scenario starts. Throws InputError.
   void read(const std::string& path, std::optional<double>& duration) {
     const Scene scene = load_scene(path);
-    if (!scene.arm) throw InputError("--scenario", path + ": is a scene without an arm");
     if (!duration) duration = scene.duration;
     for (const ScenarioStep& step : scene.steps) {
       if (step.payload) throw InputError("--scenario", path + ": has a payload, for dashpot run");

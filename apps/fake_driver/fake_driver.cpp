@@ -46,13 +46,13 @@ double low_pass_gain(double cutoff, double period) {
 }  // namespace
 
 FakeDriver::FakeDriver(const Scene& scene, DriverKind kind) : scene_(scene), kind_(kind) {
-  if (!scene.arm || scene.dof() != 7) throw InputError("robot", "an arm of seven joints is wanted");
+  if (scene.dof() != 7) throw InputError("robot", "an arm of seven joints is wanted");
   if (!scene.arm->config.robot.options.gravity.isZero(0)) {
     throw InputError("robot.gravity",
                      "must be [0, 0, 0]: the driver compensates gravity, so that none is left");
   }
-  mechanism_ = make_mechanism(scene);
-  plant_.emplace(*mechanism_, plant_options(scene), scene.start, scene.velocity);
+  arm_.emplace(scene.arm->robot, scene.arm->options);
+  plant_.emplace(*arm_, plant_options(scene), scene.start, scene.velocity);
   last_position_ = spring_rest_ = scene.start;
   velocity_ = last_torque_ = JointVector::Zero(scene.dof());
   due_.assign(static_cast<std::size_t>(std::max(scene.plant.delay, 1)), last_torque_);

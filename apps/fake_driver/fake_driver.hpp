@@ -61,7 +61,7 @@ class FakeDriver {
 
   const Scene& scene_;
   lcmtypes::DriverKind kind_;
-  std::unique_ptr<sim::System> mechanism_;
+  std::optional<sim::Arm> arm_;
   std::optional<sim::Plant> plant_;
   std::optional<lcmtypes::DriverCommand> command_;
   std::int64_t arrived_ = 0;              ///< when the command did, us

@@ -71,7 +71,4 @@ class PluginLibrary {
   const dashpot_plugin* functions_ = nullptr;  // for the rest of the program
 };
 
-/// A controller for uncontrolled masses: zero torque, and the modes of the matrices.
-std::unique_ptr<LoopController> make_null_controller(const MatrixSystem& system, double period);
-
 }  // namespace dashpot::apps

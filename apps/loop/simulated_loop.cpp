@@ -39,19 +39,16 @@ std::int64_t repetition(const Scene& scene) {
 ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
     : scene_(scene),
       controller_(controller),
-      mechanism_(make_mechanism(scene)),
+      arm_(scene.arm->robot, scene.arm->options),
       goal_(controller, repetition(scene)) {
   torque_ = JointVector::Zero(scene.dof());
   sim::PlantOptions options = scene.plant;
-  if (scene.arm) {
-    begin();
-    arm_ = dynamic_cast<sim::Arm*>(mechanism_.get());
-    const bool outside = scene.outside_limits;
-    guide(outside ? scene.start : scene.rest, scene.start, outside ? 0 : guidance_time(scene),
-          scene.arm->config.settings.motion.gain_time + kSettling);
-    options.initial_torque = torque_;
-  }
-  plant_.emplace(*mechanism_, options, scene.start, scene.velocity);
+  begin();
+  const bool outside = scene.outside_limits;
+  guide(outside ? scene.start : scene.rest, scene.start, outside ? 0 : guidance_time(scene),
+        scene.arm->config.settings.motion.gain_time + kSettling);
+  options.initial_torque = torque_;
+  plant_.emplace(arm_, options, scene.start, scene.velocity);
 }
 
 void ClosedLoop::begin() {
@@ -108,7 +105,7 @@ std::int32_t ClosedLoop::control() noexcept {
   if (fault != nullptr && (fault->every == 0 || tick % fault->every != 0)) return status_;
   const sim::Measurement& measured = plant_->measured();
   status_ = controller_.update(measured.time, measured.position, measured.velocity,
-                               scene_.arm ? goal_.told(measured.time) : nullptr, torque_);
+                               goal_.told(measured.time), torque_);
   goal_.note_status(status_);
   if (status_ < 0) torque_.setZero();  // a refused call leaves the robot to its host
   return status_;
@@ -122,7 +119,6 @@ sim::Status ClosedLoop::move() noexcept {
   }
   const sim::Status status = plant_->step(torque_);
   extremes_.kinetic_energy = std::max(extremes_.kinetic_energy, plant_->audit().stored.kinetic);
-  if (arm_ == nullptr) return status;
   if (const auto force = contact_force()) {
     extremes_.contact_force = std::max(extremes_.contact_force, force->norm());
   }
@@ -131,13 +127,13 @@ sim::Status ClosedLoop::move() noexcept {
   extremes_.speed_share =
       std::max(extremes_.speed_share, velocity.cwiseAbs().cwiseQuotient(limit).maxCoeff());
   extremes_.tip_speed =
-      std::max(extremes_.tip_speed, arm_->tip_twist(plant_->position(), velocity).head<3>().norm());
+      std::max(extremes_.tip_speed, arm_.tip_twist(plant_->position(), velocity).head<3>().norm());
   return status;
 }
 
-std::optional<Eigen::Vector3d> ClosedLoop::contact_force() const noexcept {
-  if (arm_ == nullptr || !scene_.arm->options.wall) return std::nullopt;
-  return arm_->wall_force(plant_->state());
+std::optional<Eigen::Vector3d> ClosedLoop::contact_force() noexcept {
+  if (!scene_.arm->options.wall) return std::nullopt;
+  return arm_.wall_force(plant_->state());
 }
 
 /// One period of a motion by hand, which begins and ends at rest.
@@ -152,7 +148,6 @@ void ClosedLoop::carry(const LoopFault& fault) noexcept {
 }
 
 void ClosedLoop::follow_scenario() noexcept {
-  if (!scene_.arm) return;
   const auto& steps = scene_.steps;
   while (next_step_ < steps.size() && steps[next_step_].at <= plant_->time()) {
     controller::Setpoint setpoint = steps[next_step_++].setpoint;

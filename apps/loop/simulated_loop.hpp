@@ -11,13 +11,13 @@ namespace dashpot::apps {
 
 /// The greatest true values of a run, not the sensors'.
 struct Extremes {
-  double speed_share = 0;     ///< of a joint's speed over its limit; 0 for a system of matrices
-  double tip_speed = 0;       ///< m/s; likewise
+  double speed_share = 0;     ///< of a joint's speed over its limit
+  double tip_speed = 0;       ///< m/s
   double kinetic_energy = 0;  ///< J
   double contact_force = 0;   ///< of the wall, N; 0 without one
 };
 
-/// A scene in motion: a controller and the simulated mechanism, one period at a time:
+/// A scene in motion: a controller and the simulated arm, one period at a time:
 ///     ClosedLoop loop(scene, controller);
 ///     while (...) { loop.follow_scenario(); loop.control(); loop.move(); }
 /// Equal calls give equal bits. Only the constructor throws.
@@ -59,7 +59,7 @@ class ClosedLoop {
   LoopController& controller() noexcept { return controller_; }
   const sim::Plant& plant() const noexcept { return *plant_; }
   /// Returns the force of the wall on the tip now, N, in the base's axes; nothing without a wall.
-  std::optional<Eigen::Vector3d> contact_force() const noexcept;
+  std::optional<Eigen::Vector3d> contact_force() noexcept;
   const Extremes& extremes() const noexcept { return extremes_; }
 
  private:
@@ -70,8 +70,7 @@ class ClosedLoop {
 
   const Scene& scene_;
   LoopController& controller_;
-  std::unique_ptr<sim::System> mechanism_;
-  sim::Arm* arm_ = nullptr;  // the mechanism, if it is one
+  sim::Arm arm_;
   std::optional<sim::Plant> plant_;
   LoopGoal goal_;
   bool leave_gains_ = false;

@@ -61,8 +61,8 @@ class CsvSink : public lcmtypes::Sink {
     line_ = "time [s]";
     for (std::size_t k = 0; k < units_.size(); ++k) {
       for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
-        const std::string unit = units_[k].empty() ? "" : " [" + units_[k][i] + "]";
-        line_ += std::string(",") + kJointColumns[k] + std::to_string(i + 1) + unit;
+        line_.append(",").append(kJointColumns[k]).append(std::to_string(i + 1));
+        line_.append(" [").append(units_[k][i]).append("]");
       }
     }
     line_ +=
@@ -103,14 +103,11 @@ class CsvSink : public lcmtypes::Sink {
 }  // namespace
 
 std::unique_ptr<lcmtypes::Sink> make_csv_sink(const std::string& path,
-                                              const controller::RobotModel* model) {
-  std::array<text::Units, 3> units;
-  if (model != nullptr) {
-    units = {controller::joint_units(*model, "rad", "m"),
-             controller::joint_units(*model, "rad/s", "m/s"),
-             controller::joint_units(*model, "N m", "N")};
-  }
-  return std::make_unique<CsvSink>(path, std::move(units));
+                                              const controller::RobotModel& model) {
+  return std::make_unique<CsvSink>(
+      path, std::array{controller::joint_units(model, "rad", "m"),
+                       controller::joint_units(model, "rad/s", "m/s"),
+                       controller::joint_units(model, "N m", "N")});
 }
 
 }  // namespace dashpot::apps

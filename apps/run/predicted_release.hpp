@@ -4,7 +4,6 @@
 #include <dashpot/apps/scene/scene.hpp>
 
 #include <optional>
-#include <string>
 
 namespace dashpot::apps {
 
@@ -12,12 +11,11 @@ namespace dashpot::apps {
 struct PredictedRelease {
   analysis::Spectrum<> spectrum;
   analysis::ModeShares shares;
-  std::string point;  ///< whose amplitudes these are
 };
 
 /// Returns the shares for a scene whose robot is released away from its rest, linear about the
-/// rest. Amplitudes belong to the tip's x, y and z, or to the coordinates of matrices. Nothing if
-/// the robot starts at rest, has elastic gears, or has no modes.
+/// rest. Amplitudes belong to the tip's x, y and z, m. Nothing if the robot starts at rest, has
+/// elastic gears, or has no modes.
 std::optional<PredictedRelease> predict_release(const Scene& scene);
 
 }  // namespace dashpot::apps

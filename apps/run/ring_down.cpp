@@ -29,12 +29,8 @@ Scene quiet_scene(const Scene& scene, const JointVector& start) {
   quiet.plant.position_noise.resize(0);
   quiet.plant.velocity_noise.resize(0);
   quiet.plant.position_resolution.resize(0);
-  if (quiet.arm) {
-    quiet.arm->options.wrenches.clear();
-    quiet.steps.resize(1);
-  } else {
-    quiet.matrices->forces.clear();
-  }
+  quiet.arm->options.wrenches.clear();
+  quiet.steps.resize(1);
   return quiet;
 }
 
@@ -185,7 +181,7 @@ std::optional<RingDown> measure_ring_down(const Scene& scene,
   result.releases = scene.dof();
   result.residual = std::sqrt(1 - fit.explained);
   std::vector<Row> rows = rows_of(rest->modes);
-  if (scene.arm) add_sampled(scene, result, rows);
+  add_sampled(scene, result, rows);
   // Without noise all found modes exist, even those that would be doubtful in a record of an arm.
   std::vector<identification::MeasuredMode> found = fit.modes;
   found.insert(found.end(), fit.rejected.begin(), fit.rejected.end());

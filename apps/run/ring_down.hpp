@@ -29,7 +29,7 @@ struct RingDown {
   double residual = 0;     ///< of the fit, relative to the motion
   double growth = 0;       ///< of the fastest growing motion of the sampled loop, 1/s
   double gain_margin = 0;  ///< factor by which all gains may grow before the sampled loop becomes
-                           ///< unstable; 0 for a system of matrices
+                           ///< unstable
   std::vector<std::string> assumes;     ///< assumptions of that loop
   std::vector<double> integral_decays;  ///< of the slow modes that the integral causes, 1/s, the
                                         ///< slowest first; negative: growing

@@ -74,7 +74,7 @@ std::vector<std::unique_ptr<lcmtypes::Sink>> make_sinks(const Options& options, 
     sinks.push_back(open_for("--log", [&] { return lcmtypes::make_log_sink(options.log); }));
   }
   if (!options.csv.empty()) {
-    sinks.push_back(make_csv_sink(options.csv, scene.arm ? &scene.arm->config.model : nullptr));
+    sinks.push_back(make_csv_sink(options.csv, scene.arm->config.model));
   }
   return sinks;
 }
@@ -140,8 +140,9 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
 
 /// Throws if an output would overwrite an input or another output.
 void check_files(const Options& options, const Scene& scene) {
-  std::vector<NamedFile> inputs = {{"the scene", options.scene}, {"--plugin", options.plugin}};
-  if (scene.arm) inputs.push_back({"the robot description", scene.arm->config.robot.urdf});
+  const std::vector<NamedFile> inputs = {{"the scene", options.scene},
+                                         {"--plugin", options.plugin},
+                                         {"the robot description", scene.arm->config.robot.urdf}};
   const std::string url =
       options.url.empty() && !options.fast ? lcmtypes::default_url() : options.url;
   check_outputs(
@@ -169,31 +170,16 @@ void run(const Options& options) {
   }
   Scene scene = load_scene(options.scene);
   check_files(options, scene);
-  if (options.commands && !scene.arm) {
-    throw InputError("--commands", "has nothing to command: the scene is a system of matrices");
-  }
-  if (!options.excite.empty() && !scene.arm) {
-    throw InputError("--excite", "has nothing to excite: the scene is a system of matrices");
-  }
   std::optional<Excitation> excitation;
   if (!options.excite.empty()) {
     excitation = read_excitation(options.excite, scene.arm->config.settings);
   }
   if (options.duration) scene.duration = *options.duration;
-  if (scene.arm) {
-    warn_of(scene.arm->config);
-    note_unknown(scene.plant, scene.arm->config.settings.analysis.sampled);
-  }
-  std::optional<PluginLibrary> plugin;
-  if (scene.arm) plugin.emplace(options.plugin);
-  if (!scene.arm && !options.plugin.empty()) {
-    throw InputError("--plugin", "has nothing to control: the scene is a system of matrices");
-  }
-  const auto make_controller = [&] {
-    return plugin ? plugin->create(scene.path, scene.dof())
-                  : make_null_controller(*scene.matrices, scene.plant.period);
-  };
-  if (plugin) check_steps(scene, *plugin);
+  warn_of(scene.arm->config);
+  note_unknown(scene.plant, scene.arm->config.settings.analysis.sampled);
+  const PluginLibrary plugin(options.plugin);
+  const auto make_controller = [&] { return plugin.create(scene.path, scene.dof()); };
+  check_steps(scene, plugin);
 
   const auto controller = make_controller();
   ClosedLoop loop(scene, *controller);
@@ -202,16 +188,14 @@ void run(const Options& options) {
   RunReport report = run_loop(options, scene, loop, open_bus(options));
   report.scene = options.scene;
   report.joints = scene.dof();
-  if (scene.arm) {
-    const controller::RobotModel& model = scene.arm->config.model;
-    report.missing_rotors = controller::missing_rotors_text(model);
-    report.friction_text = controller::friction_text(model);
-    report.drives = scene.arm->config.robot.options.drives;
-    report.drives_text = controller::drives_text(model, report.drives);
-    report.without_rotors = controller::arm_without_rotors(model);
-    report.rotors_hint =
-        controller::rotors_hint(model, "robot.reflected_inertia", "robot.drives:", "\n  ");
-  }
+  const controller::RobotModel& model = scene.arm->config.model;
+  report.missing_rotors = controller::missing_rotors_text(model);
+  report.friction_text = controller::friction_text(model);
+  report.drives = scene.arm->config.robot.options.drives;
+  report.drives_text = controller::drives_text(model, report.drives);
+  report.without_rotors = controller::arm_without_rotors(model);
+  report.rotors_hint =
+      controller::rotors_hint(model, "robot.reflected_inertia", "robot.drives:", "\n  ");
   report.period = scene.plant.period;
   report.simulated_time = loop.plant().time();
   report.release = predict_release(scene);

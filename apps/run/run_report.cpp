@@ -270,7 +270,7 @@ std::string to_table(const RunReport& report) {
   }
   if (report.release) {
     out += "\nRelease at the start: shares of the modes\n" +
-           shares_table(report.release->spectrum, report.release->shares, report.release->point);
+           shares_table(report.release->spectrum, report.release->shares, "the tip's x, y, z, m");
   }
   if (report.ring_down) {
     out += "\nRing-down after " + count(report.ring_down->releases, "small release") +

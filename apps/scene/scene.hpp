@@ -5,7 +5,6 @@
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/lcmtypes/command_filter.hpp>
 #include <dashpot/sim/arm.hpp>
-#include <dashpot/sim/linear_system.hpp>
 #include <dashpot/sim/plant.hpp>
 
 #include <optional>
@@ -16,12 +15,6 @@ namespace dashpot::apps {
 
 using controller::InputError;
 using controller::JointVector;
-
-/// Uncontrolled masses on springs and dampers: M qdd + C qd + K q = f(t).
-struct MatrixSystem {
-  Eigen::MatrixXd mass, damping, stiffness;
-  std::vector<sim::Piece<JointVector>> forces;
-};
 
 /// A controlled robot arm.
 struct ControlledArm {
@@ -50,18 +43,17 @@ struct LoopFault {
 /// Joint vectors have n entries.
 struct Scene {
   std::string path;
-  std::optional<ControlledArm> arm;      ///< either this
-  std::optional<MatrixSystem> matrices;  ///< or this
-  double duration = 5;                   ///< s
-  bool ring_down = false;                ///< fit the modes of small releases, too
+  std::optional<ControlledArm> arm;  ///< there is one once the scene is loaded
+  double duration = 5;               ///< s
+  bool ring_down = false;            ///< fit the modes of small releases, too
   sim::PlantOptions plant;
-  lcmtypes::CommandLimits commands;    ///< what an arm may be commanded over a bus
-  std::vector<LoopFault> loop_faults;  ///< of an arm; of overlapping ones the first counts
-  bool outside_limits = false;         ///< an arm may start outside its position limits
+  lcmtypes::CommandLimits commands;    ///< what the arm may be commanded over a bus
+  std::vector<LoopFault> loop_faults;  ///< of overlapping ones the first counts
+  bool outside_limits = false;         ///< the arm may start outside its position limits
   JointVector rest;                    ///< where the springs are fixed at first, rad
   JointVector start;                   ///< where the robot is let go, rad
-  JointVector velocity;                ///< with this velocity, rad/s; zero for an arm
-  std::vector<ScenarioStep> steps;     ///< of an arm, by time; the first one at 0
+  JointVector velocity;                ///< with this velocity, rad/s
+  std::vector<ScenarioStep> steps;     ///< by time; the first one at 0
 
   int dof() const { return static_cast<int>(rest.size()); }
 };

@@ -44,7 +44,7 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
   }
   scene.plant.period = config.settings.period;
   scene.commands = command_limits(root, config);
-  read_simulation(root, positions, scene.plant, &simulation);
+  read_simulation(root, positions, scene.plant, simulation);
   try {
     scene.arm.emplace(ControlledArm{
         std::move(config),
@@ -56,37 +56,12 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
   read_scenario(root, positions, scene);
 }
 
-void read_system(const YamlNode& document, Scene& scene) {
-  static constexpr std::array<std::string_view, 4> kKeys = {"system", "control", "simulation",
-                                                            "scenario"};
-  static constexpr std::array<std::string_view, 3> kMatrices = {"mass", "damping", "stiffness"};
-  static constexpr std::array<std::string_view, 1> kControl = {"period"};
-  const YamlMapping root(document, "", kKeys);
-  const YamlMapping system = root.mapping("system", kMatrices);
-  MatrixSystem& matrices = scene.matrices.emplace();
-  for (const auto& [key, matrix] : {std::pair("mass", &matrices.mass),
-                                    {"damping", &matrices.damping},
-                                    {"stiffness", &matrices.stiffness}}) {
-    const auto given = system.matrix(key);
-    if (!given) throw system.error(key, "missing", root.line("system"));
-    *matrix = *given;
-    if (given->rows() != given->cols() || given->rows() < 1 ||
-        given->rows() > controller::kMaxJoints || given->rows() != matrices.mass.rows()) {
-      throw system.error(key, "a square matrix of 1 to 16 rows is wanted, all three of one size");
-    }
-  }
-  read_number(root.mapping("control", kControl), "period", "s", kPositive, scene.plant.period);
-  const Units positions(static_cast<std::size_t>(matrices.mass.rows()), "m");
-  read_simulation(root, positions, scene.plant, nullptr);
-  read_scenario(root, positions, scene);
-}
-
 /// Throws if fixed steps are too long for elastic gears: the integrator would damp them, and a
 /// ringing arm would look calm.
 void check_steps(const Scene& scene) {
   constexpr double kFinest = 0.5;  // omega h, at which RK4 damps with a ratio of 2e-4
   const sim::IntegratorOptions& integrator = scene.plant.integrator;
-  if (!scene.arm || integrator.adaptive) return;
+  if (integrator.adaptive) return;
   const double omega = sim::Arm(scene.arm->robot).fastest_gear(scene.start);
   const double step = std::min(integrator.max_step, scene.plant.period);
   if (omega * step <= kFinest) return;
@@ -100,10 +75,10 @@ void check_steps(const Scene& scene) {
 /// Throws unless the simulator accepts the scene.
 void check(const Scene& scene) try {
   check_steps(scene);
-  const auto mechanism = make_mechanism(scene);
-  const sim::Plant plant(*mechanism, scene.plant, scene.start, scene.velocity);
+  sim::Arm arm(scene.arm->robot, scene.arm->options);
+  const sim::Plant plant(arm, scene.plant, scene.start, scene.velocity);
 } catch (const sim::InvalidScene& error) {
-  throw InputError(scene.matrices ? "system" : "simulation", error.what());
+  throw InputError("simulation", error.what());
 }
 
 }  // namespace
@@ -128,15 +103,9 @@ Scene load_scene(const std::string& path) try {
   scene.path = path;
   const YamlNode document = text::parse_yaml(text::read_regular_file(path));
   if (has_key(document, "mass")) {
-    throw InputError("",
-                     "is a system of matrices, which dashpot analyze and design take; a scene has "
-                     "mass, damping and stiffness under the key system");
+    throw InputError("", "is a system of matrices, which dashpot analyze and design take");
   }
-  if (has_key(document, "system")) {
-    read_system(document, scene);
-  } else {
-    read_arm(document, std::filesystem::path(path).parent_path(), scene);
-  }
+  read_arm(document, std::filesystem::path(path).parent_path(), scene);
   check(scene);
   return scene;
 } catch (const InputError& error) {
@@ -159,15 +128,6 @@ JointVector posture_of(const std::string& config, const PostureOption& option,
   const bool starts =
       option.q.empty() && has_key(text::parse_yaml(text::read_regular_file(config)), "scenario");
   return option.read(model, starts ? load_scene(config).start : JointVector());
-}
-
-std::unique_ptr<sim::System> make_mechanism(const Scene& scene) {
-  if (scene.matrices) {
-    const MatrixSystem& system = *scene.matrices;
-    return std::make_unique<sim::LinearSystem>(system.mass, system.damping, system.stiffness,
-                                               system.forces);
-  }
-  return std::make_unique<sim::Arm>(scene.arm->robot, scene.arm->options);
 }
 
 }  // namespace dashpot::apps

@@ -2,14 +2,12 @@
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/scene/scene.hpp>
 
-#include <memory>
 #include <string>
 
 namespace dashpot::apps {
 
-/// Reads a YAML file. For an arm it is a configuration file of the controller (load_config) with
-/// three keys more, `commands`, `simulation` and `scenario`; otherwise `system` has the matrices.
-/// sim/scenes has examples with all keys. Throws InputError.
+/// Reads a YAML file: a configuration file of the controller (load_config) with three keys more,
+/// `commands`, `simulation` and `scenario`. sim/scenes/panda.yaml has all keys. Throws InputError.
 Scene load_scene(const std::string& path);
 
 /// Returns the parameters of a simulation of the robot that a controller knows.
@@ -29,8 +27,5 @@ CommandedConfig load_commanded_config(const std::string& path);
 /// Throws InputError.
 JointVector posture_of(const std::string& config, const PostureOption& option,
                        const controller::RobotModel& model);
-
-/// The mechanism of the scene.
-std::unique_ptr<sim::System> make_mechanism(const Scene& scene);
 
 }  // namespace dashpot::apps

@@ -15,10 +15,10 @@ struct ArmSimulation {
   std::filesystem::path directory;  ///< of the scene
 };
 
-/// Reads `simulation` of a scene of n joints into `plant`, and for an arm into `arm`; `positions`
-/// has the unit of each joint ("rad" or "m"). Throws InputError.
+/// Reads `simulation` of a scene into `plant` and `arm`; `positions` has the unit of each joint
+/// ("rad" or "m"). Throws InputError.
 void read_simulation(const text::YamlMapping& root, const text::Units& positions,
-                     sim::PlantOptions& plant, ArmSimulation* arm);
+                     sim::PlantOptions& plant, ArmSimulation& arm);
 
 /// Reads mass, center and inertia of a body at the tip. Throws InputError.
 template <class Vector3, class Matrix3>
@@ -32,10 +32,10 @@ void read_body(const text::YamlMapping& keys, double& mass, Vector3& center, Mat
 void read_contact(const text::YamlMapping& keys, const char* stiffness, const char* damping,
                   sim::Contact& contact);
 
-/// Reads `commands`, of an arm. Throws InputError.
+/// Reads `commands`. Throws InputError.
 void read_commands(const text::YamlMapping& root, lcmtypes::CommandLimits& limits);
 
-/// Reads `scenario` into the scene, which has its arm or matrices already. Throws InputError.
+/// Reads `scenario` into the scene, which has its arm already. Throws InputError.
 void read_scenario(const text::YamlMapping& root, const text::Units& positions, Scene& scene);
 
 /// Reads `scenario.faults` into the plant's options and the scene. Throws InputError.

@@ -99,7 +99,7 @@ void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
   if (!by.isZero(0)) throw keys.error(key, out_of_reach(by));
 }
 
-void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
+void read_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
   static constexpr std::array<std::string_view, 5> kKeys = {
       "position", "velocity", "joint_displacement", "tip_displacement", "outside_limits"};
   const YamlMapping keys = scenario.mapping("start", kKeys);
@@ -148,43 +148,14 @@ void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& 
   check_wall(keys, moved_by, scene);
 }
 
-void read_system_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 2> kKeys = {"position", "velocity"};
-  const YamlMapping keys = scenario.mapping("start", kKeys);
-  scene.start = scene.rest;
-  read_numbers(keys, "position", positions, kAnyNumber, scene.start);
-  read_numbers(keys, "velocity", Units(positions.size(), "m/s"), kAnyNumber, scene.velocity);
-}
-
-/// Reads when a push begins and ends.
-template <class Value>
-sim::Piece<Value> read_times(const YamlMapping& keys, const YamlMapping& scenario,
-                             const Scene& scene) {
-  sim::Piece<Value> piece;
-  require(keys, "begin", scenario, "pushes");
-  require(keys, "end", scenario, "pushes");
-  read_when(keys, scene, piece.begin, piece.end);
-  return piece;
-}
-
-void read_arm_pushes(const YamlMapping& scenario, Scene& scene) {
+void read_pushes(const YamlMapping& scenario, Scene& scene) {
   static constexpr std::array<std::string_view, 3> kKeys = {"begin", "end", "wrench"};
   for (const YamlMapping& keys : mappings(scenario, "pushes", kKeys)) {
-    auto piece = read_times<sim::Vector6>(keys, scenario, scene);
-    require(keys, "wrench", scenario, "pushes");
+    sim::Piece<sim::Vector6> piece;
+    for (const char* key : {"begin", "end", "wrench"}) require(keys, key, scenario, "pushes");
+    read_when(keys, scene, piece.begin, piece.end);
     read_numbers(keys, "wrench", kWrenchUnits, kAnyNumber, piece.value);
     scene.arm->options.wrenches.push_back(piece);
-  }
-}
-
-void read_system_pushes(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 3> kKeys = {"begin", "end", "force"};
-  for (const YamlMapping& keys : mappings(scenario, "pushes", kKeys)) {
-    auto piece = read_times<JointVector>(keys, scenario, scene);
-    require(keys, "force", scenario, "pushes");
-    piece.value = JointVector::Zero(scene.dof());
-    read_numbers(keys, "force", Units(positions.size(), "N"), kAnyNumber, piece.value);
-    scene.matrices->forces.push_back(piece);
   }
 }
 
@@ -332,20 +303,12 @@ void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene
   if (scene.duration > kLongest) throw keys.error("duration", "is more than 1e7 s");
   read_switch(keys, "ring_down", scene.ring_down);
   scene.rest = scene.velocity = JointVector::Zero(static_cast<Eigen::Index>(positions.size()));
-  if (scene.arm) {
-    read_arm_start(keys, positions, scene);
-    read_arm_pushes(keys, scene);
-    read_loads(keys, scene);
-    read_tables(keys, scene);
-    read_steps(keys, positions, scene);
-    read_faults(keys, positions, scene);
-  } else {
-    read_system_start(keys, positions, scene);
-    read_system_pushes(keys, positions, scene);
-    for (const char* key : {"loads", "tables", "steps", "faults"}) {
-      if (keys.has(key)) throw keys.error(key, "is for robot arms; this scene is a system");
-    }
-  }
+  read_start(keys, positions, scene);
+  read_pushes(keys, scene);
+  read_loads(keys, scene);
+  read_tables(keys, scene);
+  read_steps(keys, positions, scene);
+  read_faults(keys, positions, scene);
 }
 
 }  // namespace dashpot::apps

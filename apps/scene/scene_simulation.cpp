@@ -151,14 +151,14 @@ void read_contact(const YamlMapping& keys, const char* stiffness, const char* da
 }
 
 void read_simulation(const YamlMapping& root, const Units& positions, sim::PlantOptions& plant,
-                     ArmSimulation* arm) {
+                     ArmSimulation& arm) {
   static constexpr std::array<std::string_view, 7> kKeys = {
       "integrator", "drives", "sensors", "seed", "robot", "stops", "wall"};
   const YamlMapping keys = root.mapping("simulation", kKeys);
   plant.integrator.max_step = plant.period;
-  if (arm != nullptr) read_robot(keys, positions, *arm);
+  read_robot(keys, positions, arm);
   // Gears ring much faster than the arm, and how fast depends on the posture.
-  if (arm != nullptr && (arm->parameters.gear_stiffness.array() < kRigid).any()) {
+  if ((arm.parameters.gear_stiffness.array() < kRigid).any()) {
     plant.integrator.method = sim::Method::kDormandPrince8;
     plant.integrator.adaptive = true;
   }
@@ -168,13 +168,7 @@ void read_simulation(const YamlMapping& root, const Units& positions, sim::Plant
   int seed = 1;
   read_count(keys, "seed", 0, seed);
   plant.seed = static_cast<std::uint64_t>(seed);
-  if (arm != nullptr) {
-    read_surroundings(keys, arm->options);
-    return;
-  }
-  for (const char* key : {"robot", "stops", "wall"}) {
-    if (keys.has(key)) throw keys.error(key, "is for robot arms; this scene is a system");
-  }
+  read_surroundings(keys, arm.options);
 }
 
 }  // namespace dashpot::apps

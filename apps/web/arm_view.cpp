@@ -53,7 +53,6 @@ Json chain_json(const controller::RobotModel& model) {
 ArmView::ArmView(const std::string& config) : config_(controller::load_config(config)) {
   try {
     const Scene scene = load_scene(config);
-    if (!scene.arm) return;
     simulated_wall_ = scene.arm->options.wall;
     one_table_ = scene.arm->options.tables.empty();
   } catch (const InputError&) {  // a configuration without a scene

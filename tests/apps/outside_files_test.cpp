@@ -28,7 +28,7 @@ bool is_plain(const std::string& text) {
 
 TEST(RunOutput, OverwritesNoSceneWhateverItIsCalled) {
   const Scratch scratch;
-  const std::string path = changed(scratch, "chain3", {});
+  const std::string path = changed(scratch, "ur5", "../models/", DASHPOT_SOURCE_DIR "/sim/models/");
   const std::string before = scratch.read("scene.yaml");
   fs::create_symlink(path, scratch.path("link"));
   fs::create_hard_link(path, scratch.path("hard"));
@@ -112,13 +112,13 @@ TEST(Names, AreShownWithoutSteeringTheTerminal) {
 
 TEST(Names, OfScenesAreShownSoToo) {
   const Scratch scratch;
-  changed(scratch, "chain3", {});
+  changed(scratch, "ur5", "../models/", DASHPOT_SOURCE_DIR "/sim/models/");
   const std::string path = scratch.path("\033[31m\x9b\u009b\n.yaml");
   fs::copy_file(scratch.path("scene.yaml"), path);
   const Outcome shown = run_scene(path, {"--duration", "0.01"});
   EXPECT_EQ(shown.status, 0) << shown.err;
   EXPECT_TRUE(is_plain(shown.out)) << shown.out;
-  EXPECT_THAT(shown.out, HasSubstr("\\x1b[31m\\x9b\\u009b\\x0a.yaml: 3 joints"));
+  EXPECT_THAT(shown.out, HasSubstr("\\x1b[31m\\x9b\\u009b\\x0a.yaml: 6 joints"));
 
   const Outcome object = run_scene(path, {"--duration", "0.01", "--json"});
   EXPECT_EQ(object.status, 0) << object.err;

@@ -140,7 +140,7 @@ TEST(Progress, OfManySystemsIsABarAndCtrlCLeavesThoseDone) {
 
 TEST(Progress, OfARunTellsTimesAndOverruns) {
   const Outcome outcome =
-      run_on_terminal({"run", scene("chain3"), "--duration", "2.5", "--lcm-url", own_url()},
+      run_on_terminal({"run", scene("ur5"), "--duration", "2.5", "--lcm-url", own_url()},
                       [](Running&, auto&) {});
   EXPECT_EQ(outcome.status, 0);
   EXPECT_THAT(outcome.err, HasSubstr(" of 2.50 s, "));
@@ -150,7 +150,7 @@ TEST(Progress, OfARunTellsTimesAndOverruns) {
 
 TEST(Progress, IsNotWrittenToFiles) {
   const Outcome outcome =
-      run_program({"run", scene("chain3"), "--duration", "1.5", "--lcm-url", own_url()});
+      run_program({"run", scene("ur5"), "--duration", "1.5", "--lcm-url", own_url()});
   EXPECT_EQ(outcome.err, "");
 }
 

@@ -21,8 +21,6 @@ TEST(RunCommands, AreNotTakenWhereTheyMakeNoSense) {
   EXPECT_EQ(complaint_about({"run", scene("ur5"), "--fast", "--commands"}),
             "dashpot run: --commands: is for real time: with --fast commands would come at no "
             "particular time\n");
-  EXPECT_EQ(complaint_about({"run", scene("chain3"), "--commands"}),
-            "dashpot run: --commands: has nothing to command: the scene is a system of matrices\n");
 }
 
 TEST(RunCommands, AreSaidNotToBeTaken) {

@@ -7,8 +7,8 @@ namespace {
 using namespace dashpot;  // NOLINT(google-build-using-namespace)
 
 void simulate(const apps::Scene& scene) {
-  const auto mechanism = apps::make_mechanism(scene);
-  sim::Plant plant(*mechanism, scene.plant, scene.start, scene.velocity);
+  sim::Arm arm(scene.arm->robot, scene.arm->options);
+  sim::Plant plant(arm, scene.plant, scene.start, scene.velocity);
   const sim::JointVector torque = sim::JointVector::Zero(scene.dof());
   for (int tick = 0; tick < 3; ++tick) {
     if (plant.step(torque) != sim::Status::kOk) return;

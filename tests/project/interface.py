@@ -105,9 +105,6 @@ def yaml_keys(folder):
                "duration": 0.001, "start": {"position": [0, -0.8, 0, -2.4, 0, 1.6, 0.8]},
                "steps": [{"at": 0}]}}
     yield from (f"arm: {key}" for key in known_keys(check_scene, arm, []))
-    masses = {"system": {"mass": [[1]], "damping": [[1]], "stiffness": [[1]]},
-              "scenario": {"duration": 0.001}}
-    yield from (f"system: {key}" for key in known_keys(check_scene, masses, []))
     yield from (f"analyze: {key}" for key in known_keys(check_system, {"mass": [[1]]}, []))
 
 

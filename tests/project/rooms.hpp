@@ -101,7 +101,7 @@ inline const std::vector<Room>& rooms() {
        {kText, kEigen}},
       {"sim/dynamics",
        1,
-       {"robot", "arm", "linear_system"},
+       {"robot", "arm"},
        {kText, kEigen, "urdf_", "console_bridge/"}},
       {"sim/integrators", 1, {"integrator"}, {kEigen}},
       {"sim/hardware", 2, {"plant"}, {kEigen}},

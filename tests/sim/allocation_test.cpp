@@ -12,6 +12,7 @@ namespace {
 
 using testing::allocations_of;
 using testing::joints;
+using testing::LinearSystem;
 
 /// A loop over every feature, with a command that fails in between.
 void expect_no_allocation(System& system, PlantOptions options, const JointVector& start) {

@@ -1,7 +1,7 @@
 // The stable contact stiffness of a loop, against plants in simulation: the growth of a touch on
 // both sides of the limit shows where it changes sign.
 #include <dashpot/controller/contact_audit.hpp>
-#include <dashpot/sim/linear_system.hpp>
+#include <dashpot/tests/support/linear_system.hpp>
 #include <dashpot/tests/support/mujoco_arm.hpp>
 #include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -114,7 +114,7 @@ TEST(Contact, MassesTurnWhereTheLimitIs) {
     const double rate = -point.damping_ratio * point.natural_frequency * loop.period;
     if (rate < 2e-5) continue;  // too slow to be seen
     expect_turn(limit.stiffness, [&](double k) {
-      sim::LinearSystem masses(system.mass, D, P + k * a * a.transpose());
+      testing::LinearSystem masses(system.mass, D, P + k * a * a.transpose());
       auto drives = testing::plant_options(loop);
       drives.integrator.max_step = 0.05 * loop.period;
       sim::Plant plant(masses, drives, 1e-3 * system.mass.llt().solve(a));

@@ -16,6 +16,7 @@ using testing::joints;
 using testing::kMethods;
 using testing::kOne;
 using testing::kZero;
+using testing::LinearSystem;
 using testing::run;
 
 int order_of(Method method) {

@@ -3,7 +3,7 @@
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/posture_loop.hpp>
-#include <dashpot/sim/linear_system.hpp>
+#include <dashpot/tests/support/linear_system.hpp>
 #include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
@@ -69,7 +69,7 @@ TEST(LoopStability, TurnsWhereTheAnalysisSays) {
       system.damping = loop.friction + factor * margin * (nominal.damping - loop.friction);
       const analysis::SampledSpectrum sampled = sample_loop(system, analyze(system), loop);
       EXPECT_EQ(sampled.stable(), factor < 1);
-      sim::LinearSystem masses(system.mass, loop.friction, passive);
+      testing::LinearSystem masses(system.mass, loop.friction, passive);
       sim::Plant plant(masses, plant_options(loop), random.vector(n));
       const MatrixXd K = system.stiffness - passive, C = system.damping - loop.friction;
       const double grown = growth(ticks_to_tell(sampled.spectral_radius), [&] {

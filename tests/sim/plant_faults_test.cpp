@@ -12,6 +12,7 @@ namespace {
 using testing::joints;
 using testing::kOne;
 using testing::kZero;
+using testing::LinearSystem;
 using testing::run;
 
 /// Returns the measurement at tick 5 of a mass that moves with 2 m/s from 1 m on, with a fault from

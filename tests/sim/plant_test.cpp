@@ -21,6 +21,7 @@ using Eigen::MatrixXd;
 using testing::joints;
 using testing::kOne;
 using testing::kZero;
+using testing::LinearSystem;
 using testing::run;
 
 TEST(Plant, HoldsATorqueForAPeriod) {
@@ -332,20 +333,6 @@ TEST(Plant, RefusesOptionsThatMakeNoSense) {
               Plant(mass, {}, joints({0, 0}));
             }),
             "initial position: has 2 entries, must have 1");
-}
-
-TEST(LinearSystem, RefusesMatricesThatMakeNoSense) {
-  const auto refused = [](const MatrixXd& M, const MatrixXd& C, const MatrixXd& K) {
-    return testing::refusal_of([&] { LinearSystem(M, C, K); });
-  };
-  const MatrixXd I = MatrixXd::Identity(2, 2);
-  EXPECT_EQ(refused(I, I, I), "accepted");
-  EXPECT_EQ(refused(I, kOne, I), "damping: is 1 x 1, must be 2 x 2");
-  EXPECT_EQ(refused(-I, I, I), "mass: is not positive definite");
-  EXPECT_EQ(refused(I, I, MatrixXd{{1, 2}, {3, 1}}),
-            "stiffness: is not symmetric: entry (1,2) is 2, entry (2,1) is 3");
-  EXPECT_EQ(refused(I, I / 0.0, I), "damping: has an entry that is not finite");
-  EXPECT_EQ(refused(MatrixXd(0, 0), I, I), "mass: has 0 rows, must have 1 to 16");
 }
 
 }  // namespace

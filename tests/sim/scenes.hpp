@@ -2,8 +2,8 @@
 // Small mechanisms with known answers.
 
 #include <dashpot/sim/arm.hpp>
-#include <dashpot/sim/linear_system.hpp>
 #include <dashpot/sim/plant.hpp>
+#include <dashpot/tests/support/linear_system.hpp>
 #include <dashpot/tests/support/refusal.hpp>
 
 #include <functional>

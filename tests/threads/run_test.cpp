@@ -114,7 +114,7 @@ TEST(RunInFastMotion, EndsItsRingDownOnCtrlC) {
 }
 
 TEST(RunInRealTime, LastsAsLongAsItIsTold) {
-  Running run({"run", scene("chain3"), "--duration", "2.5", "--lcm-url", own_url()});
+  Running run({"run", scene("ur5"), "--duration", "2.5", "--lcm-url", own_url()});
   EXPECT_EQ(run.finish(), 0);
   EXPECT_THAT(run.output(), HasSubstr("2500 ticks of 1.00 ms, in real time; "));
 }
