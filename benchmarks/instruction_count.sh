@@ -1,19 +1,14 @@
 #!/usr/bin/env bash
 # Counts instructions with callgrind:
-#     benchmarks/instruction_count.sh PROGRAMS FOLDER [TRIALS]
-# PROGRAMS is the folder of random_ticks, gain_ticks and sim_ticks; FOLDER takes callgrind's files.
+#     benchmarks/instruction_count.sh PROGRAMS FOLDER
+# PROGRAMS is the folder of random_ticks; FOLDER takes callgrind's files.
 # It counts control ticks, and fails if the most expensive of 1000 takes more than 1.3 times the median, joint or
 # Cartesian. With gains, frame and mode that change at every tick the ratio is printed as well: to the
 # median of the same ticks, and of settled ones. Then ticks that find the modes: followed, standing
 # still, and lost, where nothing can be followed: their most expensive tick may take 10 medians of
 # followed ones, and no more.
-# It counts ticks with the worst of all gains that are accepted: a search of TRIALS gains comes first, then
-# ticks with the worst it found and with random ones are counted. Fails if the most expensive of these
-# takes more than 10 times the median of ticks whose modes are followed.
-# It counts simulated periods: what each part of a scene costs. It fails unless a scene without the part takes
-# fewer instructions than one with.
 set -euo pipefail
-programs=$1 folder=$2 trials=${3:-2000} status=0
+programs=$1 folder=$2 status=0
 
 count() { # FUNCTION PROGRAM ARG...: instructions in the function, of each tick if it ends ticks
   local file files
@@ -48,47 +43,5 @@ count_ticks() {
   done
 }
 
-count_gains() {
-  local joints followed ticks median worst gains line
-  local update='dashpot::controller::ControllerCore::update(*'
-  for joints in 7 16; do
-    followed=$(count "$update" gain_ticks "$joints" followed 120 |
-      tail -n 100 | sort -n | sed -n 50p)
-    "$programs/gain_ticks" "$joints" search "$trials" >"$folder/gains.txt"
-    count "$update" gain_ticks "$joints" replay <"$folder/gains.txt" >"$folder/gains.counts"
-    paste "$folder/gains.counts" "$folder/said" | sort -n >"$folder/gains.sorted"
-    ticks=$(wc -l <"$folder/gains.counts")
-    median=$(sed -n "$(((ticks + 1) / 2))p" "$folder/gains.sorted" | cut -f 1)
-    read -r worst gains < <(tail -n 1 "$folder/gains.sorted")
-    line=${gains#line } line=${line%%[^0-9]*}
-    echo "$joints joints: instructions a tick: followed $followed (median); $ticks ticks with" \
-      "$(wc -l <"$folder/gains.txt") gains, sought and random: median $median, most $worst"
-    awk -v w="$worst" -v f="$followed" 'BEGIN { printf "  most: %.2f medians of followed ticks", w / f
-      exit w > 10 * f }' || status=1
-    printf ', with %s\n  kind, task, axes, seeds, exponents: %s\n' "$gains" \
-      "$(sed -n "${line}p" "$folder/gains.txt")"
-    # Work is counted in units of about one instruction.
-    awk '{ match($0, /[0-9]+ units/); u = substr($0, RSTART, RLENGTH) + 0
-      if (u > 100000) { r = $1 / u; n++; sum += r; if (r > most) most = r } }
-      END { if (n) printf "  instructions for a unit of work: %.2f in the mean of %d ticks, %.2f at most\n",
-        sum / n, n, most }' "$folder/gains.sorted"
-  done
-}
-
-count_scenes() {
-  local ticks=200 bare kind extra
-  scene() { count 'dashpot::sim::Plant::step(*' sim_ticks "$1" $ticks; }
-  bare=$(scene bare)
-  printf '%-12s %8d instructions a period\n' bare $((bare / ticks))
-  for kind in $("$programs/sim_ticks"); do
-    [[ $kind != bare ]] || continue
-    extra=$((($(scene "$kind") - bare) / ticks))
-    printf '%-12s %+8d\n' "$kind" "$extra"
-    ((extra > 0)) || status=1
-  done
-}
-
 count_ticks
-count_gains
-count_scenes
 exit $status
