@@ -11,11 +11,6 @@
 
 namespace dashpot::benchmarks {
 
-/// Calls follow each other without a pause.
-struct AtOnce {
-  void operator()() const {}
-};
-
 /// Sleeps until the next millisecond, as a control loop does. Meanwhile the machine does other
 /// things, and the processor saves power.
 class Paced {

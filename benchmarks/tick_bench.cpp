@@ -4,11 +4,9 @@
 // state is a new one at every tick. `tick/full` has the spectrum of each as well, with shapes, and
 // the snapshot; `tick/design` also keeps a damping ratio; `tick/elastic` is `tick/full` of an arm
 // with elastic joints and 14 modes; `tick/loaded` has `control.load` and `jacobian_rate` on, under
-// a wrench; `_steady` has the integral of the springs, and friction compensated at the measured
-// velocity; `_values_only` has no shapes; `_background` hands the spectrum to a thread;
-// `_percentiles` times a million ticks one by one. `tick/paced` and `tick/evicted` are `tick/full`
-// at the pace of 1 kHz, and after 64 MB of other data have passed through the caches. `footprint`
-// exists under callgrind alone: a tick of each of these, see footprint.py.
+// a wrench. `tick/paced` and `tick/evicted` are `tick/full` at the pace of 1 kHz, and after 64 MB
+// of other data have passed through the caches. `footprint` exists under callgrind alone: a tick of
+// each of these, see footprint.py.
 #include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -69,7 +67,6 @@ std::vector<RobotState> swing(const JointVector& center) {
 struct Extra {
   double ratio = 0;      ///< damping ratio of the design; 0: none
   bool loaded = false;   ///< a load and `jacobian_rate` are in the modes
-  bool steady = false;   ///< with the integral and friction compensation
   bool elastic = false;  ///< with elastic joints
 };
 
@@ -123,8 +120,6 @@ class Loop {
     if (extra.loaded) settings.task_terms = {Load::kBaseWrench, true};
     settings.analysis = analysis;
     settings.feed_forward.friction = true;
-    if (extra.steady) settings.feed_forward.friction_at = FeedForward::FrictionAt::kMeasured;
-    if (extra.steady) settings.integral.time = 1;
     settings.limits.beyond_model = true;
     settings.limits.torque *= 1e3;  // so that no limit is at work
     settings.limits.torque_rate *= 1e6;
@@ -223,26 +218,19 @@ int main(int argc, char** argv) {
   const Analysis every_tick{Analysis::Where::kInline, 1, 0.1, 0.1, true, {}};
   add("tick/cartesian", Mode::kCartesian, off, {6, 7, 14});
   add("tick/joint", Mode::kJoint, off, {6, 7, 14});
-  add("tick/cartesian_steady", Mode::kCartesian, off, {7}, {0, false, true});
-  add("tick/joint_steady", Mode::kJoint, off, {7}, {0, false, true});
-  const Analysis values_only{Analysis::Where::kInline, 1, 0.1, 0.1, false, {}};
-  const Analysis background{Analysis::Where::kBackground, 1, 0.1, 0.1, true, {}};
   add("tick/full", Mode::kCartesian, every_tick,
       {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
-  add("tick/design", Mode::kCartesian, every_tick, {6, 7, 14}, {0.7, false, false});
-  add("tick/loaded", Mode::kCartesian, every_tick, {7}, {0, true, false});
-  add("tick/elastic", Mode::kCartesian, every_tick, {7}, {0, false, false, true});
+  add("tick/design", Mode::kCartesian, every_tick, {6, 7, 14}, {0.7});
+  add("tick/loaded", Mode::kCartesian, every_tick, {7}, {0, true});
+  add("tick/elastic", Mode::kCartesian, every_tick, {7}, {0, false, true});
   add("tick/full_joint", Mode::kJoint, every_tick, {6, 7, 14});
-  add("tick/full_values_only", Mode::kCartesian, values_only, {6, 7, 14});
-  add("tick/full_background", Mode::kCartesian, background, {6, 7, 14});
-  add_one_by_one<dashpot::benchmarks::AtOnce>("tick/full_percentiles", every_tick, 1'000'000);
   add_one_by_one<dashpot::benchmarks::Paced>("tick/paced", every_tick, 2000);
   add_one_by_one<dashpot::benchmarks::Evicted>("tick/evicted", every_tick, 200);
   if (RUNNING_ON_VALGRIND != 0) {
     add_footprint("tick/joint/7", Mode::kJoint, off);
     add_footprint("tick/cartesian/7", Mode::kCartesian, off);
     add_footprint("tick/full/7", Mode::kCartesian, every_tick);
-    add_footprint("tick/design/7", Mode::kCartesian, every_tick, {0.7, false, false});
+    add_footprint("tick/design/7", Mode::kCartesian, every_tick, {0.7});
   }
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();

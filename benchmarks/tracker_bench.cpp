@@ -7,10 +7,10 @@
 // `eigen_full` (of run-time size) have n joints and n modes; `tracked/14` and `path_eigen/14` are a
 // Panda with elastic joints, and `tracked_link/14` is one whose links are measured;
 // `tracked_nonsymmetric` has the same path with a part of K and C that is not symmetric.
-// `backward_error` is the worst along the path, of every kRivalSteps-th system. `unproved` is the
-// time for a hostile system. `paced` and `evicted`, and `eigen_...` and `lapack_...` of them, are
-// timed call by call: one in a millisecond, and after 64 MB of other data have passed through the
-// caches. Coefficients or state matrix, just written by a loop, are near the processor.
+// `backward_error` is the worst along the path, of every kRivalSteps-th system. `paced` and
+// `evicted`, and `eigen_...` and `lapack_...` of them, are timed call by call: one in a
+// millisecond, and after 64 MB of other data have passed through the caches. Coefficients or state
+// matrix, just written by a loop, are near the processor.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/tests/support/arm_path.hpp>
@@ -242,24 +242,6 @@ void track(benchmark::State& state, const std::vector<System<kMaxDof>>& path,
   state.counters["backward_error"] = error;
 }
 
-/// The most expensive known update: n coinciding modes at critical damping under a stiffness that
-/// is not symmetric, solved directly and not proved.
-void unproved(benchmark::State& state, int n) {
-  std::mt19937 engine(kSeed);
-  std::uniform_real_distribution<double> small(-1e-6, 1e-6);
-  System<kMaxDof> system(n);
-  system.damping.diagonal().setConstant(20);
-  for (double& entry : system.stiffness.reshaped()) entry = small(engine);
-  system.stiffness.diagonal().array() += 100;
-  const auto tracker = std::make_unique<ModeTracker>();
-  const auto spectrum = std::make_unique<TrackedSpectrum>();
-  for (auto _ : state) {
-    system.stiffness(0, 0) += 1e-6;  // never the same twice
-    benchmark::DoNotOptimize(tracker->update(system, *spectrum));
-  }
-  if (spectrum->status != Status::kUncertified) state.SkipWithError(to_text(spectrum->status));
-}
-
 /// Systems for the rivals.
 struct RivalPath {
   std::vector<System<kMaxDof>> systems;
@@ -462,10 +444,6 @@ int main(int argc, char** argv) {
   for (const int n : {7, kMaxDof}) {
     add("spectrum/tracked_nonsymmetric/" + std::to_string(n),
         [=](benchmark::State& state) { track(state, nonsymmetric_path(n), {}, Input::kMoving); });
-  }
-  for (const int n : {7, kMaxDof}) {
-    add("spectrum/unproved/" + std::to_string(n),
-        [=](benchmark::State& state) { unproved(state, n); });
   }
   add_cold<dashpot::benchmarks::Paced>("paced", 2000);
   add_cold<dashpot::benchmarks::Evicted>("evicted", 200);
