@@ -7,37 +7,18 @@
 
 namespace dashpot::analysis {
 
-/// The damping ratio wanted of a mode, a smooth function of the mode's undamped natural frequency:
-///
-///     ratio(omega) = high_ratio + (low_ratio - high_ratio) / (1 + (omega / corner)^2).
-///
-/// The ratio depends on the frequency and not on a mode's number, so that nothing jumps where modes
-/// cross.
+/// The damping ratio wanted of every mode.
 struct DampingTarget {
-  double low_ratio = 0.7;   ///< zeta of slow modes; not negative
-  double high_ratio = 0.7;  ///< zeta of fast modes; not negative
-  double corner = 1;        ///< rad/s, where the ratio is half-way; positive
+  double ratio = 0.7;  ///< not negative
   /// Modes slower than this (rad/s) are soft. Next to a singularity the hand cannot follow the
   /// spring. The ratio of soft modes is given up so that the damping matrix stays bounded.
   /// Positive.
   double soft_frequency = 1e-3;
 
-  /// Returns a target with one ratio for all modes.
   static DampingTarget constant(double zeta) {
     DampingTarget target;
-    target.low_ratio = target.high_ratio = zeta;
+    target.ratio = zeta;
     return target;
-  }
-
-  double ratio(double omega) const noexcept {
-    const double x = omega / corner;
-    return high_ratio + (low_ratio - high_ratio) / (1 + x * x);
-  }
-
-  /// Returns d ratio / d omega, s.
-  double slope(double omega) const noexcept {
-    const double x = omega / corner, sum = 1 + x * x;
-    return -2 * (low_ratio - high_ratio) * x / (corner * sum * sum);
   }
 
   /// Returns the damper that acts through a spring of unit stiffness on a mode of frequency omega:
@@ -46,9 +27,9 @@ struct DampingTarget {
   /// omega with two derivatives, is smooth in omega^2, falls to zero with omega, and never exceeds
   /// kPeak 2 ratio / soft.
   double damper(double omega, double soft) const noexcept {
-    if (omega >= soft) return 2 * ratio(omega) / omega;
+    if (omega >= soft) return 2 * ratio / omega;
     const double x = (omega / soft) * (omega / soft);
-    return 2 * ratio(omega) * x * (35 + x * (15 * x - 42)) / (8 * soft);
+    return 2 * ratio * x * (35 + x * (15 * x - 42)) / (8 * soft);
   }
   static constexpr double kPeak = 1.1413;
 

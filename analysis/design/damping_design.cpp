@@ -86,7 +86,7 @@ ClosedForm solve_closed_form(const TaskImpedance& impedance, const MatrixXd& map
   ExtendedVector S(count), wanted(count);
   for (Index i = 0; i < count; ++i) {
     const double frequency = static_cast<double>(omega[i]);
-    wanted[i] = static_cast<Extended>(2 * target.ratio(frequency) * frequency);
+    wanted[i] = static_cast<Extended>(2 * target.ratio * frequency);
     DampingTarget unit = DampingTarget::constant(1);
     const double s = frequency > 0 ? std::sqrt(unit.damper(frequency, soft) / (2 * frequency)) : 0;
     S[i] = static_cast<Extended>(s);
@@ -106,12 +106,11 @@ ClosedForm solve_closed_form(const TaskImpedance& impedance, const MatrixXd& map
 }
 
 void check_target(const DampingTarget& target) {
-  const auto good = [](double ratio) { return std::isfinite(ratio) && ratio >= 0; };
-  if (!good(target.low_ratio) || !good(target.high_ratio)) {
-    throw std::invalid_argument("damping: a ratio is negative or not finite");
+  if (!std::isfinite(target.ratio) || !(target.ratio >= 0)) {
+    throw std::invalid_argument("damping: the ratio is negative or not finite");
   }
-  if (!(target.corner > 0) || !(target.soft_frequency > 0)) {
-    throw std::invalid_argument("damping: corner and soft frequency have to be positive");
+  if (!(target.soft_frequency > 0)) {
+    throw std::invalid_argument("damping: the soft frequency has to be positive");
   }
 }
 
@@ -146,9 +145,8 @@ Extremes extremes_of(const DampingDesign& design, const DampingTarget& target) {
   const double soft = target.soft_limit(modes.empty() ? 0 : modes[0].natural_frequency);
   Extremes result;
   for (const Mode<>& mode : modes) {
-    const double wanted = target.ratio(mode.natural_frequency);
-    if (!(mode.natural_frequency >= soft) || !(wanted > 0)) continue;
-    result.level = std::min(result.level, mode.damping_ratio / wanted);
+    if (!(mode.natural_frequency >= soft) || !(target.ratio > 0)) continue;
+    result.level = std::min(result.level, mode.damping_ratio / target.ratio);
     result.largest = std::max(result.largest, mode.damping_ratio);
   }
   return result;
@@ -169,8 +167,7 @@ void raise_smallest_ratio(const TaskImpedance& impedance, const DampingTarget& t
     return reached;
   };
   offer(fit.within_structure(exact));
-  const double ceiling = std::max(1.5 * std::max(target.low_ratio, target.high_ratio),
-                                  extremes_of(design, target).largest);
+  const double ceiling = std::max(1.5 * target.ratio, extremes_of(design, target).largest);
   double high = 1;
   for (;;) {
     const double low = std::max(0.0, extremes_of(design, target).level);
@@ -235,7 +232,7 @@ std::vector<DampingMiss> find_misses(const Spectrum<>& spectrum, const DampingTa
   for (int i = 0; i < spectrum.modes.size(); ++i) {
     const Mode<>& mode = spectrum.modes[i];
     const double omega = mode.natural_frequency;
-    const double wanted = target.ratio(omega);
+    const double wanted = target.ratio;
     const double bound = std::isfinite(mode.damping_ratio_bound) ? mode.damping_ratio_bound : 0;
     if (std::abs(mode.damping_ratio - wanted) <= std::max(kReached, bound)) continue;
     misses.push_back({i, omega, wanted, mode.damping_ratio,

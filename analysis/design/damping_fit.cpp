@@ -157,7 +157,7 @@ std::vector<DampingFit::Residual> DampingFit::of_sample(const DampingSample& sam
   if (status != Status::kOk && status != Status::kUncertified) {
     throw std::runtime_error(to_text(status));
   }
-  const std::vector<DampingGradient> gradients = damping_gradients(system, spectrum);
+  const std::vector<MatrixXd> gradients = damping_gradients(system, spectrum);
   std::vector<Residual> result;
   const double fastest = spectrum.modes.empty() ? 0 : spectrum.modes[0].natural_frequency;
   const double soft = goal.target.soft_limit(fastest);
@@ -165,14 +165,10 @@ std::vector<DampingFit::Residual> DampingFit::of_sample(const DampingSample& sam
     const double omega = spectrum.modes[i].natural_frequency;
     const double zeta = spectrum.modes[i].damping_ratio;
     if (!(omega >= soft)) continue;
-    const DampingGradient& by = gradients[static_cast<std::size_t>(i)];
-    const double lowest = goal.level * goal.target.ratio(omega);
+    const MatrixXd& gradient = gradients[static_cast<std::size_t>(i)];
+    const double lowest = goal.level * goal.target.ratio;
     const double highest = goal.ceiling.value_or(lowest);
     if (zeta >= lowest && zeta <= highest) continue;
-    MatrixXd gradient = by.damping_ratio;
-    if (zeta < lowest || !goal.ceiling) {
-      gradient -= goal.level * goal.target.slope(omega) * by.natural_frequency;
-    }
     result.push_back({zeta < lowest ? zeta - lowest : zeta - highest,
                       sample.map.transpose() * gradient * sample.map});
   }

@@ -8,8 +8,7 @@ namespace dashpot::analysis {
 namespace {
 
 DampingTarget scaled(DampingTarget target, double level) {
-  target.low_ratio *= level;
-  target.high_ratio *= level;
+  target.ratio *= level;
   return target;
 }
 

@@ -267,7 +267,7 @@ Status RatioDamping::design(const ConstMatrix& M, const double* J, Index stride,
   DampingLevel level;
   Vector<kMaxDof> wanted(k), weight(k);
   for (Index i = 0; i < k; ++i) {
-    const double omega = problem.omega[i], whole = 2 * target_.ratio(omega) * omega;
+    const double omega = problem.omega[i], whole = 2 * target_.ratio * omega;
     const double share = borne_ == nullptr ? 1 : borne_->share(omega, whole, in_force_, level);
     wanted[i] = share * whole;
     if (!friction) weight[i] = share * target_.damper(omega, soft);

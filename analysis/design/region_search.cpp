@@ -36,7 +36,7 @@ std::vector<DampingSample> samples_of(const std::vector<TaskImpedance>& configur
 /// Returns the largest ratio allowed. Throws for options that are not valid.
 double ceiling_of(const RegionOptions& options) {
   require("damping", options.gain_margin >= 1, "the gain margin has to be at least 1");
-  const double wanted = std::max(options.target.low_ratio, options.target.high_ratio);
+  const double wanted = options.target.ratio;
   const double ceiling = options.ceiling.value_or(std::max(1.0, 1.5 * wanted));
   require("damping", ceiling >= wanted, "the largest ratio allowed is below the one wanted");
   return ceiling;

@@ -21,7 +21,7 @@ RegionSample read_spectrum(const Spectrum<>& spectrum, const DampingTarget& targ
       continue;
     }
     result.largest_ratio = std::max(result.largest_ratio, mode.damping_ratio);
-    const double wanted = target.ratio(mode.natural_frequency);
+    const double wanted = target.ratio;
     const double level = wanted > 0 ? mode.damping_ratio / wanted : 1;
     if (level < least) {
       least = level;

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
 namespace dashpot::analysis {
 namespace {
@@ -66,9 +65,9 @@ PairGradient of_block(const ModalBasis<>& basis, int block) {
 
 }  // namespace
 
-std::vector<DampingGradient> damping_gradients(const System<>& system, const Spectrum<>& spectrum) {
+std::vector<MatrixXd> damping_gradients(const System<>& system, const Spectrum<>& spectrum) {
   std::vector<bool> taken(static_cast<std::size_t>(spectrum.basis.blocks.size()), false);
-  std::vector<DampingGradient> result;
+  std::vector<MatrixXd> result;
   for (const Mode<>& mode : spectrum.modes) {
     const int block = block_of(mode, spectrum.basis, taken);
     PairGradient by = block < 0 ? of_eigenvectors(system, mode) : of_block(spectrum.basis, block);
@@ -77,10 +76,8 @@ std::vector<DampingGradient> damping_gradients(const System<>& system, const Spe
       by.product = (0.5 * (by.product + by.product.transpose())).eval();
     }
     const double omega = mode.natural_frequency, zeta = mode.damping_ratio;
-    DampingGradient one;
-    one.natural_frequency = by.product / (2 * omega);
-    one.damping_ratio = -by.sum / (2 * omega) - zeta / omega * one.natural_frequency;
-    result.push_back(std::move(one));
+    const MatrixXd of_frequency = by.product / (2 * omega);
+    result.emplace_back(-by.sum / (2 * omega) - zeta / omega * of_frequency);
   }
   return result;
 }

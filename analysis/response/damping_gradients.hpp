@@ -5,16 +5,10 @@
 
 namespace dashpot::analysis {
 
-/// The derivatives of one mode's frequency and ratio by the damping matrix, n x n each: a small dC
-/// changes a number by  sum_ij G_ij dC_ij.  For a symmetric system G is symmetric, and an entry
-/// (i,j) that moves together with (j,i) counts with 2 G_ij. NaN without a natural frequency.
-struct DampingGradient {
-  Eigen::MatrixXd natural_frequency;
-  Eigen::MatrixXd damping_ratio;
-};
-
-/// Returns the exact derivatives, one for each mode of the spectrum. With eigenvectors x, y and
-/// d = y'(2 lambda M + C) x,
+/// Returns the exact derivatives of the damping ratios by the damping matrix, n x n for each mode
+/// of the spectrum: a small dC changes a ratio by  sum_ij G_ij dC_ij.  For a symmetric system G is
+/// symmetric, and an entry (i,j) that moves together with (j,i) counts with 2 G_ij. NaN without a
+/// natural frequency. With eigenvectors x, y and d = y'(2 lambda M + C) x,
 ///
 ///     d lambda = -lambda y' dC x / d.
 ///
@@ -22,6 +16,6 @@ struct DampingGradient {
 /// the two eigenvalues. In a basis block (U, Lambda, Y, weight) of the mode, sum and product change
 /// by trace and determinant of  d Lambda = -weight Y' dC U Lambda.  This stays smooth through
 /// critical damping (d = 0), where no eigenvector basis exists.
-std::vector<DampingGradient> damping_gradients(const System<>& system, const Spectrum<>& spectrum);
+std::vector<Eigen::MatrixXd> damping_gradients(const System<>& system, const Spectrum<>& spectrum);
 
 }  // namespace dashpot::analysis

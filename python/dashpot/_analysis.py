@@ -200,30 +200,27 @@ def design_damping(M: npt.ArrayLike, K: npt.ArrayLike | None = None, *, damping_
                    jacobian: npt.ArrayLike | None = None,
                    task_stiffness: npt.ArrayLike | None = None,
                    damping: npt.ArrayLike | None = None, structure: str = "full",
-                   start: npt.ArrayLike | None = None, high_ratio: float | None = None,
-                   corner: float = 1, soft_frequency: float = 1e-3, period: float | None = None,
-                   delay: int = 0, torque_cutoff: float = 0, integral_time: float = 0,
-                   gain_margin: float = 2) -> DampingDesign:
+                   start: npt.ArrayLike | None = None, soft_frequency: float = 1e-3,
+                   period: float | None = None, delay: int = 0, torque_cutoff: float = 0,
+                   integral_time: float = 0, gain_margin: float = 2) -> DampingDesign:
     """Returns the damping with which every mode has `damping_ratio`.
 
     The springs are `task_stiffness` K_C (m x m) at `jacobian` J (m x n), or K (n x n) alone. The
-    design is added to the existing `damping` (n x n). With `high_ratio` the ratio changes
-    with the frequency, from `damping_ratio` of slow modes to `high_ratio` of fast modes, half-way at
-    `corner` (rad/s). `structure` is full, block or diagonal; with `start` the result is near that
-    matrix. Modes below `soft_frequency` (rad/s) get less. With a `period` (s) the loop is sampled as
-    in `sampled_modes`, with an integral of only the task's springs, and keeps `gain_margin`.
+    design is added to the existing `damping` (n x n). `structure` is full, block or diagonal; with
+    `start` the result is near that matrix. Modes below `soft_frequency` (rad/s) get less. With a
+    `period` (s) the loop is sampled as in `sampled_modes`, with an integral of only the task's
+    springs, and keeps `gain_margin`.
 
     Raises Error as `modes` does.
     """
-    high = damping_ratio if high_ratio is None else high_ratio
-    if max(damping_ratio, high) > 5:
-        warnings.warn(f"a damping ratio of {max(damping_ratio, high)} is not a percentage", stacklevel=2)
+    if damping_ratio > 5:
+        warnings.warn(f"a damping ratio of {damping_ratio} is not a percentage", stacklevel=2)
     loop = None
     if period is not None:
         loop = _core.SampledLoop(period, delay, torque_cutoff, False, None, None,
                                  _integral(integral_time, K, jacobian, task_stiffness))
     found = _core.design_damping(_impedance(M, damping, K, jacobian, None, task_stiffness),
-                                 damping_ratio, high, corner, soft_frequency, structure,
+                                 damping_ratio, soft_frequency, structure,
                                  to_matrix("start", start), loop, gain_margin)
     found["modes"] = make_modes(found["modes"])
     found["misses"] = tuple(Miss(*miss) for miss in found["misses"])

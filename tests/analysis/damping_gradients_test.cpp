@@ -71,7 +71,7 @@ double dot(const MatrixXd& G, const MatrixXd& dA) {
 /// Compares along random symmetric directions.
 void expect_differences(const System<>& system, Random& random, double tolerance) {
   const Spectrum<> spectrum = analyze(system);
-  const std::vector<DampingGradient> all = damping_gradients(system, spectrum);
+  const std::vector<MatrixXd> all = damping_gradients(system, spectrum);
   ASSERT_EQ(static_cast<int>(all.size()), spectrum.modes.size());
   for (int i = 0; i < spectrum.modes.size(); ++i) {
     SCOPED_TRACE("mode " + std::to_string(i));
@@ -87,12 +87,8 @@ void expect_differences(const System<>& system, Random& random, double tolerance
     const auto difference = [h](Extended a, Extended b) {
       return static_cast<double>((a - b) / (2 * h));
     };
-    const double frequency = difference(plus.frequency(), minus.frequency());
     const double ratio = difference(plus.ratio(), minus.ratio());
-    const DampingGradient& by = all[static_cast<std::size_t>(i)];
-    EXPECT_NEAR(dot(by.natural_frequency, direction), frequency,
-                tolerance * std::max(mode.natural_frequency, std::abs(frequency)));
-    EXPECT_NEAR(dot(by.damping_ratio, direction), ratio,
+    EXPECT_NEAR(dot(all[static_cast<std::size_t>(i)], direction), ratio,
                 tolerance * std::max(1.0, std::abs(ratio)));
   }
 }
