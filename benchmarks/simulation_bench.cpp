@@ -205,7 +205,6 @@ void add_fixed(const std::string& gains, double gain, int steps) {
   for (const auto& [name, method] :
        {std::pair("semi_implicit_euler", sim::Method::kSemiImplicitEuler),
         {"rk4", sim::Method::kRungeKutta4},
-        {"dormand_prince", sim::Method::kDormandPrince},
         {"dormand_prince_8", sim::Method::kDormandPrince8},
         {"implicit_midpoint", sim::Method::kImplicitMidpoint},
         {"rosenbrock", sim::Method::kRosenbrock}}) {
@@ -229,8 +228,7 @@ void add_fixed(const std::string& gains, double gain, int steps) {
 
 void add_adaptive(const std::string& gains, double gain, double tolerance) {
   const std::string end = "/" + text(tolerance);
-  for (const auto& [name, method] : {std::pair("dormand_prince", sim::Method::kDormandPrince),
-                                     {"dormand_prince_8", sim::Method::kDormandPrince8},
+  for (const auto& [name, method] : {std::pair("dormand_prince_8", sim::Method::kDormandPrince8),
                                      {"rosenbrock", sim::Method::kRosenbrock}}) {
     if (method == sim::Method::kRosenbrock && tolerance < 1e-6) continue;  // takes long
     add(gains, gain, "ours/adaptive_" + std::string(name) + end, ours_adaptive(method, tolerance));

@@ -12,7 +12,6 @@ namespace dashpot::sim {
 enum class Method : std::uint8_t {
   kSemiImplicitEuler,  ///< order 1, symplectic: qd += h qdd(q, qd), then q += h qd; 1 evaluation
   kRungeKutta4,        ///< order 4, 4 evaluations; stable on the axes for omega h < 2.8
-  kDormandPrince,      ///< order 5 with an error estimate of order 4, 6 evaluations
   kDormandPrince8,     ///< order 8 with an error estimate of orders 5 and 3, 12 evaluations
   kImplicitMidpoint,   ///< order 2, symplectic, stable for any stiffness; 2n + 4 or so evaluations
   kRosenbrock,         ///< RODAS3: order 3 with an estimate of order 2, damps the stiffest motions
@@ -47,7 +46,6 @@ class Integrator {
   using StepFunction = Status (Integrator::*)(System& system, double h) noexcept;
   Status semi_implicit_euler(System& system, double h) noexcept;
   Status runge_kutta_4(System& system, double h) noexcept;
-  Status dormand_prince(System& system, double h) noexcept;
   Status dormand_prince_8(System& system, double h) noexcept;
   Status implicit_midpoint(System& system, double h) noexcept;
   Status rosenbrock(System& system, double h) noexcept;
@@ -80,7 +78,6 @@ class Integrator {
   double next_step_ = 0;                  // s, adaptive; 0: none tried so far
   StateVector y_, next_, error_, stage_;  // a step goes from y_ to next_
   std::array<StateVector, 12> rates_;     // y' at the stages, the first at y_
-  int rates_at_next_ = 0;                 // index of y' at next_, if a step finds it; 0: none
   bool start_known_ = false;              // rates_[0] is y' at y_
   bool jacobian_known_ = false;           // jacobian_ belongs to y_
   JacobianMatrix jacobian_;

@@ -37,10 +37,9 @@ void read_integrator(const YamlMapping& simulation, double period,
                      sim::IntegratorOptions& options) {
   static constexpr std::array<std::string_view, 5> kKeys = {
       "method", "step", "adaptive", "absolute_tolerance", "relative_tolerance"};
-  static constexpr std::array<std::pair<std::string_view, sim::Method>, 6> kMethods = {
+  static constexpr std::array<std::pair<std::string_view, sim::Method>, 5> kMethods = {
       {{"semi_implicit_euler", sim::Method::kSemiImplicitEuler},
        {"rk4", sim::Method::kRungeKutta4},
-       {"dormand_prince", sim::Method::kDormandPrince},
        {"dormand_prince_8", sim::Method::kDormandPrince8},
        {"implicit_midpoint", sim::Method::kImplicitMidpoint},
        {"rosenbrock", sim::Method::kRosenbrock}}};
@@ -54,8 +53,7 @@ void read_integrator(const YamlMapping& simulation, double period,
     throw keys.error("step", "is less than a thousandth of the control period");
   }
   if (options.adaptive && !sim::estimates_error(options.method)) {
-    throw keys.error("adaptive",
-                     "goes with method dormand_prince, dormand_prince_8 or rosenbrock only");
+    throw keys.error("adaptive", "goes with method dormand_prince_8 or rosenbrock only");
   }
   read_number(keys, "absolute_tolerance", "", kPositive, options.absolute_tolerance);
   read_number(keys, "relative_tolerance", "", kPositive, options.relative_tolerance);

@@ -1,35 +1,9 @@
-// Explicit Runge-Kutta methods with an error estimate.
+// The explicit Runge-Kutta method with an error estimate.
 #include <dashpot/sim/integrator.hpp>
 
 #include <cmath>
 
 namespace dashpot::sim {
-
-/// J. R. Dormand, P. J. Prince, J. Comp. Appl. Math. 6 (1980), RK5(4)7M.
-Status Integrator::dormand_prince(System& system, double h) noexcept {
-  auto& k = rates_;
-  begin_step(system);
-  stage_ = y_ + h * (1.0 / 5 * k[0]);
-  system.rates(stage_, k[1]);
-  stage_ = y_ + h * (3.0 / 40 * k[0] + 9.0 / 40 * k[1]);
-  system.rates(stage_, k[2]);
-  stage_ = y_ + h * (44.0 / 45 * k[0] - 56.0 / 15 * k[1] + 32.0 / 9 * k[2]);
-  system.rates(stage_, k[3]);
-  stage_ = y_ + h * (19372.0 / 6561 * k[0] - 25360.0 / 2187 * k[1] + 64448.0 / 6561 * k[2] -
-                     212.0 / 729 * k[3]);
-  system.rates(stage_, k[4]);
-  stage_ = y_ + h * (9017.0 / 3168 * k[0] - 355.0 / 33 * k[1] + 46732.0 / 5247 * k[2] +
-                     49.0 / 176 * k[3] - 5103.0 / 18656 * k[4]);
-  system.rates(stage_, k[5]);
-  next_ = y_ + h * (35.0 / 384 * k[0] + 500.0 / 1113 * k[2] + 125.0 / 192 * k[3] -
-                    2187.0 / 6784 * k[4] + 11.0 / 84 * k[5]);
-  if (!options_.adaptive) return Status::kOk;
-  system.rates(next_, k[6]);
-  error_ = h * (71.0 / 57600 * k[0] - 71.0 / 16695 * k[2] + 71.0 / 1920 * k[3] -
-                17253.0 / 339200 * k[4] + 22.0 / 525 * k[5] - 1.0 / 40 * k[6]);
-  rates_at_next_ = 6;
-  return Status::kOk;
-}
 
 /// E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.5 and II.10:
 /// DOP853, whose error estimate combines one of order 5 with one of order 3.

@@ -18,8 +18,7 @@ bool is_implicit(Method method) noexcept {
 }  // namespace
 
 bool estimates_error(Method method) noexcept {
-  return method == Method::kDormandPrince || method == Method::kDormandPrince8 ||
-         method == Method::kRosenbrock;
+  return method == Method::kDormandPrince8 || method == Method::kRosenbrock;
 }
 
 Integrator::Integrator(const IntegratorOptions& options) : options_(options) {
@@ -38,10 +37,6 @@ Integrator::Integrator(const IntegratorOptions& options) : options_(options) {
       break;
     case Method::kRungeKutta4:
       step_ = &Integrator::runge_kutta_4;
-      break;
-    case Method::kDormandPrince:
-      step_ = &Integrator::dormand_prince;
-      exponent_ = -1.0 / 5;
       break;
     case Method::kDormandPrince8:
       step_ = &Integrator::dormand_prince_8;
@@ -113,11 +108,11 @@ Status Integrator::advance_adaptive(System& system, double duration, StateVector
     // The end of a segment shortens a step, which tells nothing about the next step.
     const double grown = h * std::clamp(0.9 * std::pow(error, exponent_), 0.5, 5.0);
     next_step_ = std::min(options_.max_step, last ? std::max(next_step_, grown) : grown);
-    const bool lands = contacts && system.contact_modes(next_) != modes;
-    if (lands) status = land_on_contact(system, modes, h);
+    if (contacts && system.contact_modes(next_) != modes) {
+      status = land_on_contact(system, modes, h);
+    }
     done += h;
     end_step();
-    if (lands) start_known_ = false;  // other forces from here on
   }
   if (contacts) system.thaw();
   y = y_;
@@ -180,10 +175,7 @@ void Integrator::begin_step(System& system) noexcept {
 
 void Integrator::end_step() noexcept {
   y_ = next_;
-  start_known_ = rates_at_next_ > 0;
-  if (start_known_) rates_[0].swap(rates_[static_cast<std::size_t>(rates_at_next_)]);
-  rates_at_next_ = 0;
-  jacobian_known_ = false;
+  start_known_ = jacobian_known_ = false;
 }
 
 Status Integrator::semi_implicit_euler(System& system, double h) noexcept {

@@ -61,8 +61,8 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
             "scenario.start.joint_displacement: has 6 entries; a list of 7, or one number for "
             "all, is wanted (line 21)"},
            {"panda", "method: rk4", "method: rk5",
-            "simulation.integrator.method: semi_implicit_euler, rk4, dormand_prince, "
-            "dormand_prince_8, implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 25)"},
+            "simulation.integrator.method: semi_implicit_euler, rk4, dormand_prince_8, "
+            "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 25)"},
            {"ur5", "coulomb_friction: 0.1 N m", "gear_stiffness: 1e4",
             "simulation: gear_stiffness of joint 'shoulder_pan_joint': needs a reflected_inertia, "
             "of the drive"},
