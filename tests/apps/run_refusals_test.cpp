@@ -74,7 +74,7 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
            {"ur5", "  steps:", "  tables: [{begin: 1 s, stiffness: 1 N/m}]\n  steps:",
             "scenario.tables: need simulation.wall, which is their place (line 21)"},
            {"panda", "tables:", "tables:\n    - {begin: 5 s, end: 6 s, stiffness: 1 N/m}",
-            "scenario.tables[2].begin: is before the end of the table above it (line 89)"},
+            "scenario.tables[2].begin: is before the end of the table above it (line 90)"},
            {"ur5", "  steps:", "  faults: [{begin: 1 s}]\n  steps:",
             "scenario.faults[1].begin: is of a fault that does nothing (line 21)"},
            {"ur5", "  steps:", "  faults: [{begin: 1 s, end: 0.5 s, frozen: true}]\n  steps:",
