@@ -104,10 +104,9 @@ class CsvSink : public lcmtypes::Sink {
 
 std::unique_ptr<lcmtypes::Sink> make_csv_sink(const std::string& path,
                                               const controller::RobotModel& model) {
-  return std::make_unique<CsvSink>(
-      path, std::array{controller::joint_units(model, "rad", "m"),
-                       controller::joint_units(model, "rad/s", "m/s"),
-                       controller::joint_units(model, "N m", "N")});
+  return std::make_unique<CsvSink>(path, std::array{controller::joint_units(model, "rad", "m"),
+                                                    controller::joint_units(model, "rad/s", "m/s"),
+                                                    controller::joint_units(model, "N m", "N")});
 }
 
 }  // namespace dashpot::apps

@@ -139,9 +139,8 @@ TEST(Progress, OfManySystemsIsABarAndCtrlCLeavesThoseDone) {
 }
 
 TEST(Progress, OfARunTellsTimesAndOverruns) {
-  const Outcome outcome =
-      run_on_terminal({"run", scene("ur5"), "--duration", "2.5", "--lcm-url", own_url()},
-                      [](Running&, auto&) {});
+  const Outcome outcome = run_on_terminal(
+      {"run", scene("ur5"), "--duration", "2.5", "--lcm-url", own_url()}, [](Running&, auto&) {});
   EXPECT_EQ(outcome.status, 0);
   EXPECT_THAT(outcome.err, HasSubstr(" of 2.50 s, "));
   EXPECT_THAT(outcome.err, HasSubstr(" overruns"));

@@ -99,10 +99,7 @@ inline const std::vector<Room>& rooms() {
        0,
        {"joint_types", "step_status", "simulated_system", "schedule", "invalid_scene"},
        {kText, kEigen}},
-      {"sim/dynamics",
-       1,
-       {"robot", "arm"},
-       {kText, kEigen, "urdf_", "console_bridge/"}},
+      {"sim/dynamics", 1, {"robot", "arm"}, {kText, kEigen, "urdf_", "console_bridge/"}},
       {"sim/integrators", 1, {"integrator"}, {kEigen}},
       {"sim/hardware", 2, {"plant"}, {kEigen}},
 
