@@ -53,7 +53,7 @@ class RatioDamper {
 class DesignedDamping {
  public:
   /// `viscous_friction` is the friction of the robot's joints, n, N m s/rad. The achievable damping
-  /// of the loop limits the ratios. `weights` are those of the weighted projector.
+  /// of the loop limits the ratios. `weights` belong to the weighted projector.
   explicit DesignedDamping(const JointVector& viscous_friction,
                            const analysis::BorneDamping& borne = {},
                            const JointVector& weights = {});

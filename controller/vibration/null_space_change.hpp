@@ -20,7 +20,7 @@ class NullSpaceChange {
  public:
   using TipMatrix = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, kMaxJoints, 6>;
 
-  /// `robot` and `null_space` come from the kernel at `q`. The projectors are those of `null_space`
+  /// `robot` and `null_space` come from the kernel at `q`. The projectors come from `null_space`
   /// or, if `dynamic`, the dynamic one for all that is projected.
   NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q, const DynamicsResult& robot,
                   const NullSpace& null_space, bool in_tool_axes, bool dynamic = false) noexcept;
