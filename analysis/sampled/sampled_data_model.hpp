@@ -62,7 +62,8 @@ struct SampledDataModel {
   Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A) const {
     return on_other_motions(std::move(A), unit_motions());
   }
-  static Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A, const Eigen::MatrixXd& units);
+  /// X: what unit_motions() returned.
+  static Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A, const Eigen::MatrixXd& X);
   /// Returns all eigenvalues of A outside unit_motions(), then the eigenvalues of a delay and a
   /// filter of the n - r commands that are always zero. Throws std::runtime_error.
   Eigen::VectorXcd discrete_eigenvalues() const;
