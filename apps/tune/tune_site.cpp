@@ -20,6 +20,8 @@
 namespace dashpot::apps {
 namespace {
 
+using controller::InputError;
+
 constexpr std::size_t kMostKept = 8;
 constexpr const char* kPaper = "the paper's Discussion, C_C1";
 

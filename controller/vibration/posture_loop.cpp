@@ -95,9 +95,9 @@ JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& imp
   const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
   JointMatrix K = impedance.joint_stiffness;
   add_congruence(robot.J, K_C, robot.J, K);
-  const Index n = K.rows();
-  for (Index j = 0; j < n; ++j) {
-    for (Index i = 0; i <= j; ++i) K(i, j) = K(j, i) = 0.5 * (K(i, j) + K(j, i)) / time;
+  const Eigen::Index n = K.rows();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i <= j; ++i) K(i, j) = K(j, i) = 0.5 * (K(i, j) + K(j, i)) / time;
   }
   return K;
 }

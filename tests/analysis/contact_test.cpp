@@ -172,7 +172,8 @@ TEST(Contact, BracketsHoldAtFiftyDigits) {
     const auto check = [&](double k, bool stable) {
       const std::optional<bool> proved = testing::proved_stable(touched, k);
       unknown += proved ? 0 : 1;
-      if (proved) EXPECT_EQ(*proved, stable) << k << " of " << found.stiffness;
+      if (!proved) return;
+      EXPECT_EQ(*proved, stable) << k << " of " << found.stiffness;
     };
     check(found.lower, true);
     check(found.upper, false);
@@ -323,7 +324,7 @@ TEST(PortPassivity, NoLoopThatIsCalledPassiveIsUnstable) {
     EXPECT_NEAR(found.missing_friction, (1 - share) * missing, 1e-9 * missing);
     const System<> joined = behind(system, loop, random);
     const bool stable = testing::sample(joined, loop).spectral_radius < 1 + 1e-9;
-    if (found.passive) EXPECT_TRUE(stable);
+    EXPECT_TRUE(stable || !found.passive);
     passive += found.passive ? 1 : 0;
     unstable += stable ? 0 : 1;
   }
