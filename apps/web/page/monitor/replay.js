@@ -6,7 +6,7 @@ const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 5, 10, 30];
 
 export class Replay {
   time = 0;  // s
-  end = 0;
+  end = Infinity;  // until the log is known
   playing = true;
   speed = kSpeeds.indexOf(1);
 
@@ -43,6 +43,7 @@ export class Replay {
   async run(end, frameAt) {
     $('replay').hidden = false;
     $('time').max = this.end = end;
+    this.time = Math.min(this.time, end);
     let then = performance.now(), shown = null;
     for (;;) {
       await new Promise((done) => setTimeout(done, 66));
