@@ -179,28 +179,14 @@ std::array<Trial, 2> look_at_axis(const TouchedLoop& loop, double turn) {
   return {low, last};
 }
 
-/// Returns the boundary between two trials, or another one that finer steps find below it.
-double first_boundary(const TouchedLoop& loop, Trial inside, const Trial& outside) {
-  constexpr int kSteps = 5;
-  const double found = boundary(loop, inside, outside);
-  if (inside.factor == 0) return found;
-  const double ratio = std::pow(found / inside.factor, 1.0 / kSteps);
-  for (int i = 1; i < kSteps; ++i) {
-    const Trial here = loop.at(ratio * inside.factor);
-    if (!(here.excess < 0)) return boundary(loop, inside, here);
-    inside = here;
-  }
-  return found;
-}
-
-/// Returns the next stiffness that is tried: kCoarse times the last one up to `coarse`, then 2.25
+/// Returns the next stiffness that is tried: kLeap times the last one up to `coarse`, then 2.25
 /// times, or less where that takes the touch further than a turn of `kMostTurn` rad a tick.
 double next_stiffness(const TouchedLoop& loop, double last, double first, double coarse) {
-  constexpr double kCoarse = 16;
+  constexpr double kLeap = 16;
   constexpr double kMostTurn = 0.5;  // rad
   constexpr double kRatio = 1.5;     // factor on the frequency of the touch
   if (last < first) return first;
-  if (last < coarse) return std::min(kCoarse * last, std::max(coarse, first));
+  if (last < coarse) return std::min(kLeap * last, std::max(coarse, first));
   const double turn = std::sqrt(last / loop.stiffness_at(1 / loop.period()));
   const double next = std::min(kRatio * turn, turn + kMostTurn);
   return last * (next / turn) * (next / turn);
@@ -237,7 +223,7 @@ void find_limit(const TouchedLoop& loop, const Touch& touch, ContactLimit& resul
       }
     }
     if (!(here.excess < 0)) {
-      result.stiffness = first_boundary(loop, before[0], here);
+      result.stiffness = boundary(loop, before[0], here);
       if (result.stiffness > touch.most) result.stiffness = kInfinity;
       return;
     }
