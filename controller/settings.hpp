@@ -185,10 +185,11 @@ struct Analysis {
 
   /// Analysis of the sampled loop, beside the continuous one; see SampledAnalysis.
   struct Sampled {
-    double interval = 0;               ///< time between two analyses, s; 0: no analysis
-    int delay = 0;                     ///< ticks from a torque to its effect, beyond the
-                                       ///< zero-order hold
-    double cutoff = 0;                 ///< of the drives' first-order low-pass, Hz; 0: none
+    static constexpr int kMostDelay = 20;  ///< ticks
+    double interval = 0;                   ///< time between two analyses, s; 0: no analysis
+    int delay = 0;                         ///< ticks from a torque to its effect, beyond the
+                                           ///< zero-order hold
+    double cutoff = 0;                     ///< of the drives' first-order low-pass, Hz; 0: none
     bool difference_velocity = false;  ///< the robot reports (q_k - q_k-1) / period for velocity
   } sampled;
 };

@@ -22,7 +22,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using identification::ModelCheck;
 
-constexpr double kMostDelay = 20;  // ticks, as analysis.sampled.delay
+constexpr double kMostDelay = controller::Analysis::Sampled::kMostDelay;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 analysis::SampledSpectrum spectrum_of(const RobotModel& model, const controller::Settings& settings,

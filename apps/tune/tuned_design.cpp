@@ -26,7 +26,7 @@ controller::RobotDescription with_text(controller::RobotDescription robot) {
   return robot;
 }
 
-constexpr int kMostDelay = 20;          // ticks, as in the controller; more takes seconds
+constexpr int kMostDelay = controller::Analysis::Sampled::kMostDelay;
 constexpr double kMostPayload = 1e3;    // kg
 constexpr Range kMargin{1, true, 1e6};  // of gain
 constexpr Range kUpToMillion{0, true, 1e6};

@@ -110,7 +110,8 @@ void for_each_setting(Struct& settings, Visitor&& visit) {
   visit(Setting{"analysis.shapes"}, analysis.shapes);
   visit(Setting{"analysis.sampled.interval", "s", "", text::kNotNegative},
         analysis.sampled.interval);
-  visit(Setting{"analysis.sampled.delay", "ticks", "", {0, true, 20}}, analysis.sampled.delay);
+  visit(Setting{"analysis.sampled.delay", "ticks", "", {0, true, Analysis::Sampled::kMostDelay}},
+        analysis.sampled.delay);
   visit(Setting{"analysis.sampled.cutoff", "Hz", "", text::kNotNegative}, analysis.sampled.cutoff);
   visit(Setting{"analysis.sampled.difference_velocity"}, analysis.sampled.difference_velocity);
 }

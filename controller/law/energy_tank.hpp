@@ -58,7 +58,7 @@ class EnergyTank {
   }
 
  private:
-  static constexpr std::size_t kMostDelay = 20;  // ticks, as analysis.sampled.delay
+  static constexpr std::size_t kMostDelay = Analysis::Sampled::kMostDelay;
 
   /// Returns |L^-1 torque|.
   double size(JointVector torque) const noexcept;

@@ -40,7 +40,7 @@ class NullSpaceChange {
  private:
   /// (dJ/dq_k)' F by columns
   JointMatrix torques(const Vector6& F) const noexcept;
-  /// Of one projector.
+  /// The matrices of one projector.
   struct Part {
     bool dynamic = false;
     double factor = 0;                       ///< its share

@@ -206,9 +206,8 @@ TEST(Plant, GivesTheSameBitsTwice) {
   EXPECT_NE(closed_loop(everything(3), {}), closed_loop(everything(4), {}));
 }
 
-/// What a simulation leaves out because the scene has none of it, beside a scene that has it
-/// without effect. 1e-11 is rounding of a hundred periods; Rosenbrock's method differentiates
-/// numerically.
+/// Scenes without a part are simulated like scenes that have it without effect. 1e-11 is rounding
+/// of a hundred periods; Rosenbrock's method differentiates numerically.
 TEST(Plant, LeavesOutNothingThatMatters) {
   struct Scene {
     RobotParameters parameters;

@@ -15,7 +15,7 @@ using dashpot::testing::Dice;
 using dashpot::testing::proved_stable;
 using dashpot::testing::RandomTouch;
 
-/// What is seen of all loops with or without delay.
+/// Counts of the brackets and verdicts of all loops with a delay, or without one.
 struct Seen {
   int drawn = 0, brackets = 0, unproved = 0, verdicts = 0, unknown = 0, wrong = 0, missed = 0;
   double widest = 0;

@@ -79,7 +79,7 @@ struct Found {
   double frequency = 0, frequency_std = 0, ratio = 0, ratio_std = 0;
 };
 
-/// Of the program, s.
+/// Processor time of the program, s.
 double processor_time() {
   rusage usage{};
   getrusage(RUSAGE_CHILDREN, &usage);

@@ -144,7 +144,7 @@ void set_gains(dashpot_controller* controller, double stiffness, double damping,
   expect(dashpot_set_gains(controller, &gains), expected, "dashpot_set_gains");
 }
 
-/// What the other thread does in a second of a cycle. Returns what went wrong, or nothing.
+/// Acts as the other thread does in a second of a cycle. Returns what went wrong, or nothing.
 std::string act(dashpot_controller* controller, const std::string& url, std::int64_t second) try {
   if (second == 0) {
     dashpot_release(controller);
