@@ -43,11 +43,13 @@ MatrixXd motion_of_tick(const MatrixXd& G, const MatrixXd& D) {
   MatrixXd before = 0 * identity, term = V1, next;  // of V1
   double largest = t;  // of a term: they fall like powers of the golden ratio times `size`
   for (int k = 2; (largest *= std::numbers::phi * size * t / k) > 1e-18 * t; ++k) {
-    next = -t * t / (k * (k - 1.0)) * G.lazyProduct(before);
-    if (damped) next -= t / k * D.lazyProduct(term);
-    V0 += k / t * next;
-    V1 += next;
-    V2 += t / (k + 1) * next;
+    if (damped || k % 2 == 1) {  // the other terms are zero
+      next = -t * t / (k * (k - 1.0)) * G.lazyProduct(before);
+      if (damped) next -= t / k * D.lazyProduct(term);
+      V0 += k / t * next;
+      V1 += next;
+      V2 += t / (k + 1) * next;
+    }
     before.swap(term);
     term.swap(next);
   }
