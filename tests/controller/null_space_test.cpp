@@ -256,5 +256,25 @@ TEST(ProjectorSwitch, EndsInTheLoopThatHadTheProjectorFromTheStart) {
   }
 }
 
+TEST(ProjectorSwitch, AStartBlendsGainsOnly) {
+  const RobotModel model = testing::smooth_panda();
+  Settings settings = testing::in_mode(testing::unlimited_settings(model), Mode::kCartesian);
+  settings.initial.gains.null_damping.setConstant(7, 2);
+  settings.initial.gains.null_projector = NullProjector::kKinematic;
+  settings.feed_forward = {false, false, false, false, false};
+  testing::LedArm led(model, settings);
+  led.state.velocity.setConstant(0.05);
+  led.settle();
+  const VectorXd whole = led.controller.snapshot().law_torque;
+  led.controller.reset();
+  const long ticks = std::lround(1000 * settings.motion.gain_time);
+  for (long k = 1; k < ticks; ++k) {
+    led.tick();
+    const VectorXd torque = led.controller.snapshot().law_torque;
+    EXPECT_LT((torque - torque.dot(whole) / whole.squaredNorm() * whole).norm(),
+              1e-6 * whole.norm());
+  }
+}
+
 }  // namespace
 }  // namespace dashpot::controller
