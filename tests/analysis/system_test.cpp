@@ -2,15 +2,17 @@
 #include <dashpot/analysis/elastic_form.hpp>
 #include <dashpot/analysis/mode.hpp>
 #include <dashpot/analysis/system.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 
-#include <limits>
 
 namespace dashpot::analysis {
 namespace {
 
 using Eigen::MatrixXd;
+using testing::kInfinity;
+using testing::kNan;
 
 /// "key: reason" of the refusal, or "" if the system is a proper one.
 std::string refusal(const System<>& system) {
@@ -30,8 +32,6 @@ System<> proper_system() {
 }
 
 TEST(Validate, AcceptsProperSystemsAndSaysWhatIsWrongWithOthers) {
-  static constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   using Change = void (*)(System<>&);
   struct Case {
     Change change;

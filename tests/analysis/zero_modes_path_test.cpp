@@ -35,15 +35,15 @@ TEST_P(SeveralZeroModes, AreFollowed) {
   for (int i = 0; i < p; ++i) W(i, i) += 10 + 2 * i;
   const MatrixXd dM = 1e-6 * random.spd(n), dW = 1e-3 * random.matrix(p, n);
   const VectorXd joints = VectorXd::NullaryExpr(n, [&] { return random.uniform(0.5, 2); });
-  const auto at = [&, friction = friction](double step) {
+  const auto at = [&, kind = friction](double step) {
     System<kMaxDof> system(n);
     system.mass = M + step * dM;
     const MatrixXd factor = W + step * dW;
     system.stiffness_factor = factor;
     MatrixXd C = 0.03 * factor.transpose() * factor;
-    if (friction == Friction::kEqual) C += 0.5 * system.mass;
-    if (friction == Friction::kSmall) C += 1e-6 * MatrixXd(joints.asDiagonal());
-    if (friction == Friction::kOrdinary) C += MatrixXd(joints.asDiagonal());
+    if (kind == Friction::kEqual) C += 0.5 * system.mass;
+    if (kind == Friction::kSmall) C += 1e-6 * MatrixXd(joints.asDiagonal());
+    if (kind == Friction::kOrdinary) C += MatrixXd(joints.asDiagonal());
     system.damping = 0.5 * (C + C.transpose());
     return system;
   };

@@ -6,6 +6,7 @@
 #include <dashpot/tests/support/certified_spectrum.hpp>
 
 #include <arb_fmpz_poly.h>
+#include <flint/fmpz_mat.h>
 #include <flint/fmpz_poly_factor.h>
 #include <flint/fmpz_poly_mat.h>
 
