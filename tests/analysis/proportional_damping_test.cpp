@@ -68,8 +68,7 @@ struct ProportionalFollower : testing::Follower {
 TEST_P(ProportionalPath, IsFollowed) {
   const auto [zeta, full] = GetParam();
   ProportionalFollower follower(zeta);
-  follower.follow([zeta = zeta, full = full](double t) { return arm(t, zeta, full); }, 200, 0.199,
-                  20);
+  follower.follow([z = zeta, whole = full](double t) { return arm(t, z, whole); }, 200, 0.199, 20);
   follower.expect_followed();
   EXPECT_LE(follower.counters().iterations, full ? 400 : 230);
 }

@@ -1,6 +1,6 @@
 // Output of `dashpot inspect`, and its errors for bad input.
-#include <dashpot/controller/model/urdf_tree.hpp>
 #include <dashpot/controller/posture.hpp>
+#include <dashpot/controller/robot_model.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>

@@ -27,7 +27,7 @@ Outcome run_on_terminal(const Words& arguments,
   if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) {
     throw std::runtime_error("no terminal");
   }
-  Running program(arguments, {.err = ptsname(terminal)});
+  Running program(arguments, {.out = {}, .err = ptsname(terminal)});
   Outcome outcome;
   bool ended = false;
   const auto read_on = [&] {

@@ -71,7 +71,7 @@ TEST(RobotModelErrors, NameTheFileThatCannotBeRead) {
        {std::pair(testing::arm_path("no_such_arm"), "cannot be read: No such file or directory"),
         std::pair(std::string(DASHPOT_SOURCE_DIR), "cannot be read: Is a directory"),
         std::pair(testing::arm_path("panda"), "link 'a': there is none; ")}) {
-    EXPECT_THAT([path = path] { RobotModel::from_urdf_file(path, "a", "b"); },
+    EXPECT_THAT([file = path] { RobotModel::from_urdf_file(file, "a", "b"); },
                 ::testing::ThrowsMessage<InvalidModel>(StartsWith(path + ": " + what)));
   }
 }

@@ -3,7 +3,7 @@
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/model/urdf_tree.hpp>
+#include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/settings_check.hpp>
 #include <dashpot/sim/robot.hpp>
 #include <dashpot/tests/support/arms.hpp>
