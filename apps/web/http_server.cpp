@@ -301,6 +301,7 @@ void HttpServer::Parts::accept_clients() {
       MHD_run(daemon);  // lets go of it
     }
     MHD_add_connection(daemon, socket, static_cast<sockaddr*>(any), size);  // closes it on failure
+    MHD_run(daemon);  // from version 1 on, this starts it
   }
 }
 
