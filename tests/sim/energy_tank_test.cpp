@@ -107,7 +107,7 @@ class FullTankedArms : public TankedArms {
   FullTankedArms() : TankedArms(1e3) {}
 };
 
-/// The weight that grows is that of what was attached, not of a motion to be met ahead.
+/// The weight grows with the body, not with a motion that the tank has to meet ahead.
 TEST_F(FullTankedArms, TakeUpABodyLikeOthers) {
   both([](testing::LedArm& arm) {
     arm.settle();
