@@ -201,12 +201,25 @@ TEST(CheckModelProgram, WritesTheConfigurationAndKeepsTheRest) {
   EXPECT_EQ(run_program({"check-model", file, "--config", scratch.path("n.yaml")}).status, 0);
 }
 
-TEST(CheckModelProgram, TakesMeasuredTorquesOfADriversLog) {
-  const Scratch scratch;
+/// A log of a Panda's driver with the torques of panda_record(), and with commands if `commanded`
+/// gives the torque of the command that answers a sample.
+std::string driver_log(const std::function<controller::JointVector(Eigen::Index)>& commanded = {}) {
   const identification::TorqueRecord& record = panda_record();
   std::string log;
+  std::uint64_t events = 0;
   const auto add = [&log](std::uint64_t number, int bytes) {
     for (int i = bytes - 1; i >= 0; --i) log += static_cast<char>(number >> (8 * i) & 0xFF);
+  };
+  const auto add_event = [&](std::int64_t utime, const std::string& channel, const auto& message) {
+    std::vector<std::uint8_t> bytes;
+    lcmtypes::encode(lcmtypes::DriverKind::kPanda, message, bytes);
+    add(0xEDA1DA01, 4);
+    add(events++, 8);
+    add(static_cast<std::uint64_t>(utime), 8);
+    add(channel.size(), 4);
+    add(bytes.size(), 4);
+    log += channel;
+    log.append(bytes.begin(), bytes.end());
   };
   for (Eigen::Index i = 0; i < record.time.size(); ++i) {
     lcmtypes::DriverStatus status;
@@ -215,20 +228,46 @@ TEST(CheckModelProgram, TakesMeasuredTorquesOfADriversLog) {
     status.velocity.setZero(7);
     status.torque = record.torque.col(i);
     status.external.setZero(7);
-    std::vector<std::uint8_t> bytes;
-    lcmtypes::encode(lcmtypes::DriverKind::kPanda, status, bytes);
-    const std::string channel = "PANDA_STATUS";
-    add(0xEDA1DA01, 4);
-    add(static_cast<std::uint64_t>(i), 8);
-    add(static_cast<std::uint64_t>(status.utime), 8);
-    add(channel.size(), 4);
-    add(bytes.size(), 4);
-    log += channel;
-    log.append(bytes.begin(), bytes.end());
+    add_event(status.utime, "PANDA_STATUS", status);
+    if (!commanded) continue;
+    lcmtypes::DriverCommand command;
+    command.torque = commanded(i);
+    add_event(status.utime, "PANDA_COMMAND", command);
   }
-  const Json found = check({scratch.write("panda.lcm", log), "--config", panda_config(scratch)});
+  return log;
+}
+
+TEST(CheckModelProgram, TakesMeasuredTorquesOfADriversLog) {
+  const Scratch scratch;
+  const Json found =
+      check({scratch.write("panda.lcm", driver_log()), "--config", panda_config(scratch)});
   EXPECT_NEAR(found["payload"]["mass"].get<double>(), 1.3, 0.02);
   EXPECT_THAT(found["notes"].dump(), HasSubstr("that the driver measured"));
+  EXPECT_THAT(found["notes"].dump(), Not(HasSubstr("tau_cmd")));
+}
+
+TEST(CheckModelProgram, TakesTheTorquesOfCommandsOnRequest) {
+  const Scratch scratch;
+  const std::string config = panda_config(scratch);
+  const identification::TorqueRecord& record = panda_record();
+  // Drives that act on nine tenths of the first joint's torque; a few commands are lost.
+  const std::string file =
+      scratch.write("bus.lcm", driver_log([&record](Eigen::Index i) -> controller::JointVector {
+                      if (i % 50 == 7) return controller::JointVector();
+                      controller::JointVector torque = record.torque.col(i);
+                      torque[0] /= 0.9;
+                      return torque;
+                    }));
+  const Json measured = check({file, "--config", config});
+  EXPECT_NEAR(measured["joints"][0]["coulomb_friction"].get<double>(), 0.8, 0.05);
+  EXPECT_THAT(measured["notes"].dump(), HasSubstr("--torques tau_cmd1,..."));
+  const Json commanded = check({file, "--config", config, "--torques",
+                                "tau_cmd1,tau_cmd2,tau_cmd3,tau_cmd4,tau_cmd5,tau_cmd6,tau_cmd7"});
+  EXPECT_NEAR(commanded["joints"][0]["coulomb_friction"].get<double>(), 0.8 / 0.9, 0.05);
+  EXPECT_NEAR(commanded["joints"][1]["coulomb_friction"].get<double>(), 1.0, 0.05);
+  // Each command counts at its own status: a record has 10 ms from one to the next.
+  EXPECT_NEAR(commanded["delay"].get<double>(), measured["delay"].get<double>(), 1e-3);
+  EXPECT_NEAR(commanded["payload"]["mass"].get<double>(), 1.3, 0.02);
 }
 
 /// The simulator shares no mechanics with the controller's model.
