@@ -53,6 +53,10 @@ constexpr std::array kRows = {
     Row{.what = "base tilted by 40 deg", .records = 16, .tilt = 0.7},
     Row{.what = "on the ceiling, 3 deg off", .records = 16, .tilt = 3.0892},
     Row{.what = "a link a quarter heavier", .records = 24, .heavier = 0.25},
+    Row{.what = "a third as fast, torques as commanded",
+        .records = 12,
+        .speed = 0.33,
+        .noise = 1e-6},
 };
 
 /// Counts estimates within their 95 % intervals.
