@@ -5,6 +5,7 @@ interface.py PROGRAM SOURCE [--write]: PROGRAM is dashpot in its build folder, S
 
 import ast
 import difflib
+import itertools
 import json
 import math
 import os
@@ -27,10 +28,10 @@ def run(*command, text=None):
 
 
 def symbols(library):
-    """Yields the functions that a shared library shows."""
+    """Returns the functions that a shared library shows."""
     lines = subprocess.run(["nm", "-D", "--defined-only", BUILD / library], check=True, text=True,
                            stdout=subprocess.PIPE).stdout.splitlines()
-    return (f"{library}: {name}" for name in sorted(line.split()[-1] for line in lines))
+    return f"{library}: {', '.join(sorted(line.split()[-1] for line in lines))}"
 
 
 def declarations(header):
@@ -52,17 +53,28 @@ def messages():
 
 
 def options():
-    """Yields the options of each subcommand with their values and defaults, and the exit status."""
+    """Yields each option with its value and default and the subcommands that have it, and the exit status."""
     text = run("--help").stdout
     yield " ".join(text[text.index("Exit status"):].split())
     names = re.findall(r"^  ([a-z-]+(?:, [a-z-]+)*)  ", text.split("Subcommands:")[1], re.MULTILINE)
+    commands = {}
     for name in names:
         text = run(name.split(",")[0], "--help").stdout
-        yield f"dashpot {name}"
         for section in ("Positionals:", "Options:"):
             lines = text.partition(section)[2].partition("\n\n")[0].splitlines()
-            yield from (re.split(r"  +|(?<=[])]) (?=[A-Z])", line[2:])[0] for line in lines
-                        if re.match("  [^ ]", line))
+            for line in filter(re.compile("  [^ ]").match, lines):
+                option = re.split(r"  +|(?<=[])]) (?=[A-Z])", line[2:])[0]
+                commands.setdefault(option, []).append(name)
+    yield from (f"{option}: {'; '.join(names)}" for option, names in commands.items())
+
+
+def by_place(keys):
+    """Yields the keys of each place in one line."""
+    names = {}
+    for key in keys:
+        place, _, name = key.rpartition(".")
+        names.setdefault(place, []).append(name)
+    yield from (f"{place}: {', '.join(found)}" for place, found in names.items())
 
 
 def known_keys(check, document, place):
@@ -104,8 +116,8 @@ def yaml_keys(folder):
                      "tip": "panda_hand_tcp"}, "scenario": {
                "duration": 0.001, "start": {"position": [0, -0.8, 0, -2.4, 0, 1.6, 0.8]},
                "steps": [{"at": 0}]}}
-    yield from (f"arm: {key}" for key in known_keys(check_scene, arm, []))
-    yield from (f"analyze: {key}" for key in known_keys(check_system, {"mass": [[1]]}, []))
+    yield from (f"arm.{key}" for key in known_keys(check_scene, arm, []))
+    yield from (f"analyze.{key}" for key in known_keys(check_system, {"mass": [[1]]}, []))
 
 
 def paths_of(value, path=""):
@@ -169,7 +181,7 @@ def json_keys(folder):
     answers = [(command[0], run(*command, "--json")) for command in commands]
     texts = [(name, answer.stdout or sys.exit(f"dashpot {name}: {answer.stderr}"))
              for name, answer in answers] + [("drive", interrupted_drive(folder))]
-    keys = {f"{name}: {path}" for name, text in texts for path in paths_of(json.loads(text))}
+    keys = {f"{name}{path}" for name, text in texts for path in paths_of(json.loads(text))}
     yield from sorted(keys)
 
 
@@ -211,12 +223,13 @@ def python_names():
             yield prefix + signature(name, node)
             continue
         yield f"{prefix}{name}({', '.join(ast.unparse(base) for base in node.bases)})"
-        for part in node.body:
-            yield from members(part)
+        lines = itertools.chain.from_iterable(members(part) for part in node.body)
+        for called, group in itertools.groupby(lines, key=lambda line: "(" in line):
+            yield from group if called else ["  " + ";".join(group).replace(";  ", "; ").strip()]
     for module in ("franka", "ros"):
         text = (folder / f"{module}.py").read_text(encoding="utf-8")
-        yield from (f"python -m dashpot.{module} {name}"
-                    for name in re.findall(r'add_argument\("([\w-]+)"', text))
+        names = re.findall(r'add_argument\("([\w-]+)"', text)
+        yield f"python -m dashpot.{module} {', '.join(names)}"
 
 
 def interface():
@@ -225,17 +238,17 @@ def interface():
         folder = pathlib.Path(name)
         os.chdir(folder)
         sections = {
-            "Functions of the shared libraries": [*symbols("libdashpot_plugin.so"),
-                                                  *symbols("libdashpot_publisher.so")],
+            "Functions of the shared libraries": [symbols("libdashpot_plugin.so"),
+                                                  symbols("libdashpot_publisher.so")],
             "C headers": [*declarations("controller/plugin.h"),
                           *declarations("lcmtypes/plugin_publisher.h")],
             "LCM messages": messages(), "Command line": options(),
-            "YAML keys": yaml_keys(folder), "JSON keys": json_keys(folder),
+            "YAML keys": by_place(yaml_keys(folder)), "JSON keys": by_place(json_keys(folder)),
             "Python": python_names()}
         text = ""
         for title, lines in sections.items():
             lines = list(lines)
-            assert len(lines) > 3, title
+            assert len(lines) > 1, title
             text += f"== {title}\n" + "\n".join(lines) + "\n\n"
         return text
 
