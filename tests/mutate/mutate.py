@@ -111,9 +111,9 @@ def named(change):
 def reviewed():
     """Why a change makes no difference that a test could see, by its name."""
     text = (ROOT / "tests/mutate/equivalent.txt").read_text()
-    blocks = [block.split("\n") for block in text.split("\n\n")]
-    return {tuple(block[:2]): " ".join(block[2:]).strip() for block in blocks
-            if len(block) > 2 and not block[0].startswith("#")}
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    changes = [line.split(" // ") for line in lines[1::2]]
+    return {(line, change): why for line, (change, why) in zip(lines[::2], changes)}
 
 
 def judge_all(changes, tests, before):
