@@ -358,19 +358,6 @@ TEST(DesignedDamping, IsSemidefiniteWhateverChanges) {
   EXPECT_GT(largest, 10);
 }
 
-TEST(DesignedDamping, IsSemidefiniteWhereFrictionIsTooMuch) {
-  const RobotModel model = rubbing(testing::arms()[0], 30);
-  LedArm led(model, rubbing_settings(model, Mode::kCartesian));
-  led.settle();
-  for (int k = 1; k <= 50; ++k) {
-    led.swing(0.01 * k);
-    led.state.velocity.setZero();
-    ASSERT_LE(led.tick(), Status::kTorqueLimited);
-    EXPECT_GT(least_eigenvalue_of(led.damping() - 30 * MatrixXd::Identity(7, 7)), -1e-9);
-  }
-  EXPECT_EQ(led.modes().counters.failed, 0u);
-}
-
 TEST(DesignedDamping, RefusesWhatIsNoRatio) {
   const RobotModel model = smooth_panda();
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
