@@ -71,7 +71,7 @@ def document(path, text):
         title = PARTS.sub(part, match[1])
         if match[0].startswith("# "):
             return match[0] if path == "README.md" else f"# {title} {{#{page(path)}}}"
-        anchor = re.sub(r"[^\w-]", "", match[1].replace(" ", "-")).lower()  # as GitHub and tests/project/markdown.hpp
+        anchor = re.sub(r"[^\w-]", "", match[1].replace(" ", "-")).lower()  # as GitHub and tests/project/rules.hpp
         anchors.append(anchor)
         again = anchors.count(anchor) - 1
         return f"{match[0].split()[0]} {title} {{#{page(path)}--{anchor}{f'-{again}' if again else ''}}}"
