@@ -1,5 +1,5 @@
 #pragma once
-// Contact, references, gains and timing: points 6, 7, 9 and 10 of the list of what was seen.
+// Contact, references and gains: points 6, 7 and 9 of the list of what was seen.
 
 #include <dashpot/tests/stress/safety_scenarios.hpp>
 
@@ -138,62 +138,46 @@ inline void over_damped(const PluginFile& plugin, const TestArm& arm, Row& row) 
   row.note = taken ? "gains taken" : "gains refused";
 }
 
-/// Every so many periods a state, each with its right time.
-inline Act slow_loop(int every) {
-  return [every](const PluginFile& plugin, const TestArm& arm, Row& row) {
-    Rig rig(plugin, arm, {});
-    rig.every = every;
-    JointVector to = moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.1 : 0.4);
-    rig.goal = Goal::joints(to);
-    rig.run(6);
-    row.finish(rig, {1.5, true, true});
-    row.require(row.seen.first_status != "ok", "never noticed");
+/// Stops from 0.9 of the limits of all joints at a gap, and says what energy it put in.
+inline void stop_all(const PluginFile& plugin, const TestArm& arm, RigOptions options,
+                     const std::function<void(Rig&)>& spoil, const Bounds& bounds, Row& row) {
+  options.velocity = 0.9 * limits_of(arm, &sim::Joint::velocity);
+  options.world.viscous_friction = options.world.coulomb_friction = false;
+  Rig rig(plugin, arm, options);
+  spoil(rig);
+  rig.run(rig.period());
+  const double at_first = rig.kinetic();
+  rig.skip_time(0.02);
+  rig.run(3);
+  row.finish(rig, bounds);
+  row.kept = rig.kinetic() / at_first;
+  row.note = "from " + number(at_first) + " J to " + number(rig.kinetic()) + " J; at the end " +
+             row.seen.last_status.substr(0, 30);
+}
+
+/// States are so many periods late.
+inline Act late_states(int periods, double share, bool rest) {
+  return [=](const PluginFile& plugin, const TestArm& arm, Row& row) {
+    stop_all(
+        plugin, arm, {}, [periods](Rig& rig) { rig.late = periods; }, {share, rest, false}, row);
   };
 }
 
-inline void reset_in_motion(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  Rig rig(plugin, arm, {});
-  JointVector to = moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.2 : 1.0);
-  to[1] -= 0.3;
-  rig.goal = Goal::joints(to);
-  rig.run(1);
-  rig.goal.reset();
-  rig.measure_afresh();
-  rig.reset(nullptr);
-  rig.run(0.003);
-  const double step = rig.seen.torque_step;
-  rig.run(3);
-  row.finish(rig, {1.2, false, true});
-  row.note = "torque steps by " + number(step) + " N m, carries " +
-             number(100 * row.seen.least_weight, "%.0f") + " % of the weight at least";
-  row.require(step <= 1.01 * rig.limits().torque_rate.maxCoeff() * rig.period(), "torque steps");
-  row.require(row.seen.least_weight > 0.7, "drops the weight");
+/// Torque beyond the weight acts the other way.
+inline void wrong_torque(const PluginFile& plugin, const TestArm& arm, Row& row) {
+  stop_all(
+      plugin, arm, {}, [](Rig& rig) { rig.excess_factor = -1; }, {100, false, false}, row);
+  row.require(row.seen.last_status.find("brake does not stop") != std::string::npos,
+              "never doubted");
 }
 
-inline void untold_weight(const PluginFile& plugin, const TestArm& arm, Row& row) {
+/// The controller knows of rotors that are not there: 200 times the inertia of a light wrist.
+inline void no_rotors(const PluginFile& plugin, const TestArm& arm, Row& row) {
   RigOptions options;
-  options.told_weight = false;
-  Rig rig(plugin, arm, options);
-  rig.run(3);
-  row.finish(rig, {1, true, true});
-  row.note = "sags " + number(1e3 * row.seen.tip_moved) + " mm";
-  row.require(row.seen.tip_moved < 2e-3, "sags at the start");
-}
-
-/// Every torque limit at half of the largest weight.
-inline void too_weak(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  RigOptions options;
-  const double heaviest = Rig(plugin, arm, {}).weight(start_of(arm)).cwiseAbs().maxCoeff();
-  const JointVector most = limits_of(arm, &sim::Joint::effort).cwiseMin(0.5 * heaviest);
-  options.limits = "  torque: " + yaml_list(most) + "\n";
-  Rig rig(plugin, arm, options);
-  rig.run(4);
-  row.finish(rig, {1e9, false, false});
-  row.note = "falls " + number(1e3 * row.seen.tip_moved) + " mm; at the end " +
-             row.seen.last_status.substr(0, 30);
-  row.require(row.seen.first_status.find("torque limited") == std::string::npos &&
-                  row.seen.first_status.find("torque rate limited") == std::string::npos,
-              "not noticed at first");
+  options.told_rotors = 0.2;
+  const auto leave = [](Rig&) {};
+  stop_all(plugin, arm, options, leave, {10, false, false}, row);  // a light wrist shakes at first
+  row.require(row.kept < 0.2, "goes on");
 }
 
 }  // namespace dashpot::stress

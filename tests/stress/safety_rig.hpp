@@ -3,7 +3,6 @@
 
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/sim/plant.hpp>
-#include <dashpot/tests/stress/plugin_file.hpp>
 #include <dashpot/tests/stress/safety_arms.hpp>
 #include <dashpot/tests/support/mujoco_arm.hpp>
 
@@ -35,8 +34,7 @@ struct RigOptions {
   double velocity_step = 0;    ///< of the velocities that are measured, rad/s or m/s
   sim::RobotParameters truth;  ///< of the robot; without reflected inertias it has the arm's own
   std::optional<testing::MujocoOptions> mujoco;  ///< which moves the robot then
-  bool told_weight = true;  ///< dashpot_reset with the weight before the first tick
-  double told_rotors = 0;   ///< kg m^2 (kg) each that the controller alone knows of
+  double told_rotors = 0;  ///< kg m^2 (kg) each that the controller alone knows of
 };
 
 /// A set-point that the host repeats every 0.1 s.
@@ -67,7 +65,6 @@ struct Measures {
   double driven = 0;          ///< s, a joint beyond 1.05 of its velocity limit was driven on
   double return_share = 0;    ///< greatest speed back from outside a position limit, over its limit
   double least_weight = 1;    ///< least share of its weight that the torque carried
-  double torque_step = 0;     ///< greatest change of a torque within a tick, N m
   double tip_moved = 0;       ///< farthest from where the tip was at the start, m
   int refused_goals = 0;      ///< set-points that the plugin did not take
   int changes = 0;            ///< of the status
@@ -110,7 +107,7 @@ class Rig {
     last_excess_ = JointVector::Zero(start.size());
     over_ = allowed_ = last_excess_;
     first_tip_ = body_.tip_pose(start).position;
-    if (options.told_weight) plugin.reset(controller_.get(), torque_.data());
+    plugin.reset(controller_.get(), torque_.data());
   }
 
   int n() const { return static_cast<int>(n_); }
@@ -130,11 +127,9 @@ class Rig {
   }
 
   std::optional<Goal> goal;  ///< what the host wants
-  double clock_rate = 1;     ///< of the time stamps from now on
   int late = 0;              ///< periods of the states
   double excess_factor = 1;  ///< of what exceeds the weight, between controller and robot
   int missing = 0;           ///< joints that the states lack
-  int every = 1;             ///< the controller is called every so many periods; 0: not at all
   bool faulted = false;      ///< a fault has ended the springs
   Measures seen;
 
@@ -143,7 +138,7 @@ class Rig {
   /// Everything that happens from now on is measured afresh, but for the statuses.
   void measure_afresh() {
     seen.speed_share = seen.tip_speed = seen.kinetic_energy = seen.driven = 0;
-    seen.return_share = seen.torque_step = 0;
+    seen.return_share = 0;
     seen.least_weight = 1;
     first_tip_ = body_.tip_pose(position()).position;
   }
@@ -157,9 +152,6 @@ class Rig {
     (task ? gains.task_damping : gains.joint_damping) = D.data();
     return plugin_.set_gains(controller_.get(), &gains);
   }
-  void reset(const JointVector* torque) {
-    plugin_.reset(controller_.get(), torque != nullptr ? torque->data() : nullptr);
-  }
 
   /// From now on a motor gives so many times the torque that it is to give.
   void spoil_motor(int joint, double factor) { motors_[joint] = factor; }
@@ -169,18 +161,18 @@ class Rig {
   /// Ticks with the robot free.
   void run(double seconds) {
     for (std::int64_t i = std::llround(seconds / period()); i > 0; --i) {
-      if (every > 0 && ticks_ % every == 0) control();
+      control();
       ++ticks_;
       move();
       watch();
     }
   }
-  /// A hand guides the robot to q within some seconds; the controller runs unless `paused`.
-  void guide(const JointVector& to, double seconds, bool paused = false) {
+  /// A hand guides the robot to q within some seconds.
+  void guide(const JointVector& to, double seconds) {
     const JointVector from = position();
     const std::int64_t ticks = std::max<std::int64_t>(1, std::llround(seconds / period()));
     for (std::int64_t i = 1; i <= ticks; ++i) {
-      if (!paused) control();
+      control();
       ++ticks_;
       const double s = static_cast<double>(i) / static_cast<double>(ticks);
       const double place = s * s * s * (10 + s * (-15 + 6 * s));
@@ -253,9 +245,7 @@ class Rig {
     if (velocity_step_ > 0) {
       for (double& v : measured.velocity) v = velocity_step_ * std::nearbyint(v / velocity_step_);
     }
-    stamp_ += clock_rate * static_cast<double>(measured.time - last_time_);
-    last_time_ = measured.time;
-    const std::int64_t time = skipped_ + std::llround(stamp_);
+    const std::int64_t time = skipped_ + measured.time;
     const dashpot_state state = {sizeof(dashpot_state),
                                  n_ - static_cast<std::uint32_t>(missing),
                                  time,
@@ -263,10 +253,8 @@ class Rig {
                                  measured.velocity.data(),
                                  nullptr};
     dashpot_output output = {sizeof(dashpot_output), n_, torque_.data()};
-    const JointVector before = torque_;
     const std::int32_t status = plugin_.update(controller_.get(), &state, nullptr, &output);
     if (status < 0) torque_.setZero();
-    seen.torque_step = std::max(seen.torque_step, (torque_ - before).cwiseAbs().maxCoeff());
     note(status);
   }
 
@@ -295,9 +283,8 @@ class Rig {
   std::uint32_t n_ = 0;
   std::int64_t ticks_ = 0;
   JointVector torque_;
-  std::deque<sim::Measurement> measured_;     ///< on their way
-  std::int64_t skipped_ = 0, last_time_ = 0;  ///< ns
-  double stamp_ = 0;                          ///< ns
+  std::deque<sim::Measurement> measured_;  ///< on their way
+  std::int64_t skipped_ = 0;               ///< ns
   std::int32_t last_status_ = DASHPOT_OK;
   std::deque<double> change_times_;  ///< of the status, s
   Eigen::Vector3d first_tip_;
@@ -321,7 +308,7 @@ inline void Rig::watch() {
     const double share = std::abs(qd[i]) / limit.velocity[i];
     fastest = std::max(fastest, share);
     // Too fast: the torque may go on as long as its rate limit takes to bring the slowest down.
-    if (share <= 1.05 || every == 0) {  // who is not called drives nothing
+    if (share <= 1.05) {
       over_[i] = 0;
     } else {
       if (over_[i] == 0) {

@@ -1,12 +1,83 @@
 #pragma once
-// Limits, encoders, feedback: points 1 to 5 of the list of what was seen.
+// The rows of ./run stress safety; limits, encoders, feedback: points 1 to 5 of what was seen.
 
-#include <dashpot/tests/stress/safety_row.hpp>
+#include <dashpot/tests/stress/safety_rig.hpp>
 
 #include <Eigen/Cholesky>
+#include <functional>
 #include <numbers>
+#include <string>
+#include <vector>
 
 namespace dashpot::stress {
+
+/// A scenario's bounds, in addition to no drive beyond the speed limits.
+struct Bounds {
+  double speed = 1.5;  ///< greatest joint speed over its limit
+  bool rest = true;    ///< still at the end: no motion, no changes of status, no torque that turns
+  bool driven = true;  ///< no joint is driven beyond 1.05 of its limit; false where sensors lie
+};
+
+/// Joints come back from outside a position limit no faster than this share of their velocity
+/// limits, unless they did so when the controller saw them first.
+constexpr double kSlowReturn = 0.3;
+constexpr double kRest = 0.05;  ///< of the velocity limit: what is slower counts as still
+
+struct Row {
+  std::string scenario;
+  std::string arm;
+  std::string plugin;
+  Measures seen;
+  double kept = 1;                  ///< share of the kinetic energy at the end, in a stop
+  std::string note;                 ///< what this scenario is about
+  std::vector<std::string> broken;  ///< invariants
+
+  void require(bool holds, const std::string& what) {
+    if (!holds) broken.push_back(what);
+  }
+  /// Takes the measures of a rig that has run to the scenario's end, and checks the bounds.
+  void finish(Rig& rig, const Bounds& bounds) {
+    seen = rig.at_the_end();
+    require(seen.speed_share <= bounds.speed, "too fast");
+    require(!bounds.driven || seen.driven == 0,
+            "driven on while too fast, " + std::to_string(std::lround(1e3 * seen.driven)) + " ms");
+    if (!bounds.rest) return;
+    require(seen.last_speed < kRest, "moves at the end");
+    require(seen.last_changes < 5, "status changes at the end");
+    require(seen.reversals < 0.2, "torque turns round at the end");
+  }
+};
+
+/// Runs one scenario; throws std::runtime_error where the plugin refuses it.
+using Act = std::function<void(const PluginFile& plugin, const TestArm& arm, Row& row)>;
+
+struct Scenario {
+  const char* point;  ///< of the issue's list
+  const char* name;
+  std::vector<std::string> arms;  ///< names; empty: all
+  Act act;
+  bool promised = true;  ///< or else what it breaks is shown, and does not count
+};
+
+inline Row run_scenario(const Scenario& scenario, const PluginFile& plugin, const TestArm& arm) {
+  Row row;
+  row.scenario = std::string(scenario.point) + " " + scenario.name;
+  row.arm = arm.name;
+  row.plugin = plugin.label;
+  try {
+    scenario.act(plugin, arm, row);
+  } catch (const std::runtime_error& error) {
+    row.note = std::string("refused: ") + error.what();
+    row.seen.first_status = row.seen.last_status = "refused";
+  }
+  return row;
+}
+
+inline std::string number(double value, const char* format = "%.3g") {
+  char text[32];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
 
 inline JointVector moved(JointVector q, int joint, double by) {
   q[joint] += by;
@@ -151,21 +222,6 @@ inline void wrench_without_springs(const PluginFile& plugin, const TestArm& arm,
   row.note = std::to_string(row.seen.changes) + " changes of status";
 }
 
-/// The controller is not called for 10 s; meanwhile a hand moves the robot.
-inline void moved_in_a_pause(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  Rig rig(plugin, arm, {});
-  rig.goal = Goal::joints(rig.position());
-  rig.run(1);
-  rig.guide(moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.15 : 0.5), 10, true);
-  rig.measure_afresh();
-  const JointVector there = rig.position();
-  rig.run(6);
-  row.finish(rig, {1, true, true});
-  const double back = (rig.position() - there).cwiseAbs().maxCoeff();
-  row.note = "drives back " + number(back) + (slides(arm, arm.joint) ? " m" : " rad") + " unasked";
-  row.require(back < 0.02, "drives back unasked");
-}
-
 /// Feedback fails in the middle of a motion of the tip, or of the joints. If the motion is unknown,
 /// no torque is safe: the controller has to notice it and to end the springs; then the robot needs
 /// brakes.
@@ -258,43 +314,6 @@ inline Act stop_from(double share, bool all) {
                (slides(arm, 0) ? " m" : " deg") + ", any " + number(degrees * way.maxCoeff());
     row.require(all || (slow >= 0 && slow <= 0.25), "goes on for long");
     row.require(all || slides(arm, 0) || degrees * way[0] <= 20, "goes far");
-  };
-}
-
-/// In the settling of a move of 10 cm every state repeats the same bits.
-inline void frozen_creep(const PluginFile& plugin, const TestArm& arm, Row& row) {
-  RigOptions options;
-  options.config = "control: {mode: cartesian}\n";
-  sim::SensorFault fault;
-  fault.begin = 1.2;
-  fault.frozen = true;
-  options.plant.faults = {fault};
-  Rig rig(plugin, arm, options);
-  rig.goal = Goal::at(rig.tip_at(rig.position()));
-  rig.goal->tip.position.z() -= 0.1;
-  rig.run(1.2);
-  const bool creeps = rig.plant().velocity().cwiseAbs().maxCoeff() > 2.5e-3;
-  rig.run(0.05);
-  row.finish(rig, {100, false, false});
-  row.note = creeps ? "creeps" : "stands";
-  row.require(!creeps || row.seen.last_status != "ok", "never noticed");
-}
-
-/// From 0.5 s on time stamps are wrong by so much, and somebody bumps into the arm.
-inline Act wrong_clock(double rate) {
-  return [rate](const PluginFile& plugin, const TestArm& arm, Row& row) {
-    RigOptions options;
-    controller::Vector6 push = controller::Vector6::Zero();
-    push[0] = 10;
-    options.world.wrenches = {{1.0, 1.018, push}};
-    Rig rig(plugin, arm, options);
-    rig.run(0.5);
-    rig.clock_rate = rate;
-    rig.run(3);
-    const bool light = std::string(arm.name) == "lift+gripper";  // 10 N on 3e-4 kg m^2
-    row.finish(rig, {light ? 50.0 : 1.0, true, false});
-    row.note = "carries " + number(100 * row.seen.least_weight, "%.0f") + " % of the weight";
-    row.require(row.seen.least_weight > 0.5, "drops the weight");
   };
 }
 
