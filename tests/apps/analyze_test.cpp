@@ -1,11 +1,17 @@
 // What `dashpot analyze` prints as JSON for good input.
 #include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/quad_matrix.hpp>
+#include <dashpot/tests/support/random.hpp>
 
 #include <array>
 #include <cmath>
+#include <sstream>
 
 namespace dashpot::tests {
 namespace {
+
+using dashpot::testing::Quad;
+using dashpot::testing::Random;
 
 TEST(Analyze, AnswersAListWithAListAndReadsJson) {
   const Json one =
@@ -27,15 +33,6 @@ TEST(Analyze, AnswersAListWithAListAndReadsJson) {
   EXPECT_TRUE(analyze_json("[{mass: [[1]], stiffness: [[4]]}]").is_array());
 }
 
-TEST(Analyze, AddsJointAndTaskSpaceUp) {
-  const Json result = analyze_json(
-      "mass: [[1, 0], [0, 1]]\nstiffness: [[1, 0], [0, 9]]\ndamping: [[0.2, 0], [0, 0]]\n"
-      "jacobian: [[2, 0]]\ntask_stiffness: [[6]]\ntask_damping: [[0.2]]\n");
-  expect_near({of_modes(result, "natural_frequency")}, {{5, 3}}, 1e-15);
-  expect_near({of_modes(result, "damping_ratio")}, {{0.1, 0}}, 1e-15);
-  EXPECT_EQ(result["modes"][1]["kind"], "undamped");
-}
-
 TEST(Analyze, AddsTheGeometricStiffnessAndTheJacobiansRate) {
   // K = J' K_C J + K_G + J' C_C dJ/dt with J = [1 1], K_C = 4, f = 2, C_C = 1:
   // [4 4; 4 4] + [6 0; 0 2] + [0 0; 0 0] first, then + [1 0; 1 0].
@@ -50,18 +47,6 @@ TEST(Analyze, AddsTheGeometricStiffnessAndTheJacobiansRate) {
   expect_near(general["reduced"]["stiffness"], {{11, 4}, {5, 6}}, 1e-15);
   EXPECT_EQ(general["notes"],
             Json::parse(R"(["stiffness is not symmetric: solved as a general problem"])"));
-}
-
-TEST(Analyze, SettlesWhereSeveralCriticalModesCoincide) {
-  const Json result = analyze_json(
-      "mass: [[2, 1, 0], [1, 3, 1], [0, 1, 4]]\ndamping: [[28, 14, 0], [14, 42, 14], [0, 14, 54]]\n"
-      "stiffness: [[98, 49, 0], [49, 147, 49], [0, 49, 181]]\n"
-      "initial_position: [0.1, -0.2, 0.3]\ninitial_velocity: [1, 2, 3]\n"
-      "times: [0, 1000, 1e12]\n");
-  EXPECT_EQ(result["response"]["position"],
-            Json::parse("[[0.1, -0.2, 0.3], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]"));
-  EXPECT_EQ(result["response"]["velocity"],
-            Json::parse("[[1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]"));
 }
 
 TEST(Analyze, SumsTheResponsesToAllThatIsGiven) {
@@ -158,6 +143,96 @@ TEST(Analyze, ProvesTighterBoundsWithExtendedResiduals) {
   };
   EXPECT_LT(bound("extended"), bound("working"));
   EXPECT_GT(bound("extended"), 0);
+}
+
+/// The chain of the paper; tests/analysis has its modes, examples/ and the table its motion.
+TEST(Analyze, EliminatesTheCoordinateThatIsAskedFor) {
+  const Json result =
+      parse(run_program({"analyze", example("chain3.yaml"), "--json", "--pivot", "last"}));
+  const double entry = std::copysign(0.25819888974716115, result["zero_modes"][0][0].get<double>());
+  expect_near(result["zero_modes"], {{entry, entry, entry}}, 1e-14);
+  EXPECT_LT(result["coupling"], 1e-14);
+  EXPECT_EQ(result["coupled"], false);
+  EXPECT_EQ(result["eliminated"], Json::parse("[2]"));
+  expect_near(result["constraint_matrix"], {{1, 0}, {0, 1}, {-1.6, -0.4}}, 1e-14);
+  expect_near(result["reduced"]["mass"], {{20.8, 3.2}, {3.2, 2.8}}, 1e-14);
+  expect_near(result["reduced"]["damping"], {{133.8, 40.2}, {40.2, 55.8}}, 1e-14);
+  expect_near(result["reduced"]["stiffness"], {{21264, 4656}, {4656, 4524}}, 1e-14);
+}
+
+// The bounds include the rounding of `dashpot analyze` when it forms the coefficients of a file.
+
+/// The root of the larger x with det(K - x M) = 0, for K = diag(k0, k1).
+double higher_frequency(Quad m00, Quad m01, Quad m11, Quad k0, Quad k1) {
+  const Quad det = m00 * m11 - m01 * m01, sum = k0 * m11 + k1 * m00;
+  const Quad discriminant = sum * sum - 4 * det * k0 * k1;
+  auto root = static_cast<Quad>(std::sqrt(static_cast<double>(discriminant)));
+  root = (root + discriminant / root) / 2;  // Newton's method: 30 digits
+  return std::sqrt(static_cast<double>((sum + root) / (2 * det)));
+}
+
+/// A file of systems, and their highest frequencies.
+struct Systems {
+  std::ostringstream file;
+  std::vector<double> frequencies;
+
+  Systems() { file.precision(17); }
+};
+
+/// Expects the frequencies within their bounds, and bounds not far above the errors.
+void expect_counted(const Systems& systems) {
+  const Json results = analyze_json(systems.file.str());
+  ASSERT_EQ(results.size(), systems.frequencies.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const Json& mode = results[i]["modes"][0];
+    const double truth = systems.frequencies[i], bound = mode["natural_frequency_bound"];
+    const double error = std::abs(mode["natural_frequency"].get<double>() - truth);
+    EXPECT_LE(error, bound) << "system " << i;
+    EXPECT_LE(bound, 1e-4 * truth) << "system " << i;
+    largest = std::max(largest, error / bound);
+  }
+  EXPECT_GT(largest, 0.01);
+}
+
+// In both the mass is all but singular: a rounding error of 1e-16 in it is one of 1e-7 in the
+// higher frequency.
+
+TEST(AnalyzeRounding, OfReflectedInertiaIsCounted) {
+  Random random(2301);
+  Systems systems;
+  for (int trial = 0; trial < 40; ++trial) {
+    const double first = random.log_uniform(1e-9, 4e-9), second = random.log_uniform(1e-9, 4e-9);
+    systems.file << "- {mass: [[1, 1], [1, 1]], reflected_inertia: [" << first << ", " << second
+                 << "], stiffness: [[3, 0], [0, 5]]}\n";
+    systems.frequencies.push_back(higher_frequency(1 + Quad(first), 1, 1 + Quad(second), 3, 5));
+  }
+  expect_counted(systems);
+}
+
+TEST(AnalyzeRounding, OfAPayloadIsCounted) {
+  Random random(2302);
+  Systems systems;
+  for (int trial = 0; trial < 40; ++trial) {
+    const double first = random.log_uniform(1e-9, 4e-9), second = random.log_uniform(1e-9, 4e-9);
+    const double payload = random.uniform(0.5, 1);
+    Quad inertia = 0;
+    systems.file << "- {mass: [[" << first << ", 0], [0, " << second << "]], payload: " << payload
+                 << ", jacobian: [";
+    for (int row = 0; row < 3; ++row) {
+      const double entry = random.uniform(0.5, 1);
+      systems.file << "[" << entry << ", " << entry << "], ";
+      inertia += Quad(payload) * Quad(entry) * Quad(entry);
+    }
+    systems.file << "[0, 0], [0, 0], [0, 0]], task_damping: [";
+    for (int row = 0; row < 6; ++row) {
+      systems.file << (row == 0 ? "" : ", ") << "[0, 0, 0, 0, 0, 0]";
+    }
+    systems.file << "], stiffness: [[3, 0], [0, 5]]}\n";
+    systems.frequencies.push_back(
+        higher_frequency(inertia + Quad(first), inertia, inertia + Quad(second), 3, 5));
+  }
+  expect_counted(systems);
 }
 
 }  // namespace

@@ -78,32 +78,6 @@ TEST_F(CalibrateProgram, GivesTheArmBack) {
   EXPECT_THAT(inspected["drives"]["doubt"].dump(), HasSubstr("joints 7 are not determined"));
 }
 
-TEST_F(CalibrateProgram, PredictsModesAlsoWithARotorThatIsNotDetermined) {
-  const std::string robot = scratch_.read("arm.yaml");
-  scratch_.write("arm.yaml", robot + gains_);
-  const Json found =
-      parse(run_program({"calibrate", file_, "--config", config_, "--payload", "known", "--json"}));
-  const std::string truth =
-      scratch_.write("true.yaml", robot +
-                                      "  reflected_inertia: [0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.008]\n"
-                                      "  viscous_friction: [0.5, 0.8, 0.3, 0.6, 0.2, 0.1, 0.05]\n" +
-                                      gains_);
-  std::string posture;
-  for (const Json& q : found["q"]) posture += (posture.empty() ? "" : ",") + q.dump();
-  const Json modes =
-      parse(run_program({"audit", truth, "--q", posture, "--json"}))["posture"]["modes"];
-  ASSERT_EQ(found["modes"].size(), modes.size());
-  for (std::size_t i = 0; i < modes.size(); ++i) {
-    for (const std::string key : {"natural_frequency", "damping_ratio"}) {
-      const double value = modes[i][key].get<double>(),
-                   deviation = found["modes"][i][key + "_std"].get<double>();
-      constexpr double kSampled = 0.02;  // what the period of 1 ms changes
-      EXPECT_NEAR(found["modes"][i][key].get<double>(), value, 3 * deviation + kSampled * value)
-          << key << i;
-    }
-  }
-}
-
 TEST_F(CalibrateProgram, WritesARotorThatIsNearerThanTheConfigurations) {
   const std::string config = scratch_.write(
       "known.yaml", "robot:\n  urdf: " + testing::arm_path("panda") +

@@ -196,35 +196,6 @@ TEST(ContactOfAnArm, NamesTheUnitsOfEachJointAndWhatIsUnknown) {
   EXPECT_EQ(hold["forces"][4]["force"], 50);
 }
 
-/// Three tables, the limit between the second and the third.
-TEST(ContactOfAnArm, IsWhereTheSimulatedOneBeginsToChatter) {
-  const Words words = {"contact", scene("touch"), "--direction", "z", "--json"};
-  const Json predicted = parse(run_program(words))["posture"];
-  EXPECT_GT(predicted["limit_lower"], 1e5);
-  EXPECT_LT(predicted["limit_upper"], 1e6);
-  const Scratch scratch;
-  const std::string csv = scratch.path("touch.csv");
-  EXPECT_EQ(run_scene(scene("touch"), {"--csv", csv}).status, 0);
-  const std::map<std::string, Numbers> run = table(csv);
-  const auto forces = [&](double from, double to) {
-    double least = 1e9, most = 0;
-    for (std::size_t i = 0; i < run.at("time").size(); ++i) {
-      if (run.at("time")[i] < from || run.at("time")[i] > to) continue;
-      least = std::min(least, run.at("contact_z")[i]);
-      most = std::max(most, run.at("contact_z")[i]);
-    }
-    return std::pair(least, most);
-  };
-  for (const double begin : {1.7, 4.2}) {  // at rest on the first and on the second
-    const auto [least, most] = forces(begin, begin + 0.2);
-    EXPECT_NEAR(least, 7.7, 0.5) << begin;
-    EXPECT_NEAR(most, 7.7, 0.5) << begin;
-  }
-  const auto [least, most] = forces(6.7, 6.9);  // off the third one, and onto it again
-  EXPECT_EQ(least, 0);
-  EXPECT_GT(most, 30);
-}
-
 TEST(TooHeavy, IsWarnedOfInOneLine) {
   const std::string line = "warning: --q: the arm cannot hold itself here: joint 'panda_joint";
   const Words heavy = joined(kHome, {"--payload", "40"});

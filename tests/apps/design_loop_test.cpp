@@ -55,17 +55,6 @@ TEST(DesignForALoop, LowersTheRatioToWhatKeepsTheMarginAndSaysSo) {
   EXPECT_THAT(table.out, HasSubstr("Every mode has a damping ratio of 1.56250"));
 }
 
-// Friction of the joints acts at once, so it does not reduce the damping that the loop allows.
-TEST(DesignForALoop, TakesTheDampingThatIsThereForTheJointsOwn) {
-  const Json result =
-      design_json(kMass + "damping: [[40]]\n", {"--damping-ratio", "2.5", "--period", "0.02"});
-  const double without = design_json(
-      kMass, {"--damping-ratio", "2.5", "--period", "0.02"})["modes"][0]["damping_ratio"];
-  EXPECT_NEAR(without, 100. / 80, 1e-5);
-  // about (100 + 40) / 80, less as friction brakes within a tick
-  EXPECT_GT(result["modes"][0]["damping_ratio"], without + 0.3);
-}
-
 /// controller_memory_test.cpp tests the eigenvalues and the margin.
 TEST(DesignForALoop, CountsTheIntegralOfTheSprings) {
   const std::vector<std::string> options = {"--damping-ratio", "0.4", "--period", "0.02",
