@@ -120,6 +120,17 @@ def yaml_keys(folder):
     yield from (f"analyze.{key}" for key in known_keys(check_system, {"mass": [[1]]}, []))
 
 
+def check_examples(keys):
+    """Ends the program if an example lacks a key: of configurations, or of what only scenes have."""
+    examples = [(SOURCE / name).read_text(encoding="utf-8")
+                for name in ("controller/examples/panda.yaml", "sim/scenes/panda.yaml")]
+    for key in keys:
+        place, _, name = key.rpartition(".")
+        of_scene = place.startswith(("arm.simulation", "arm.scenario", "arm.commands")) and ".gains" not in place
+        if place.startswith("arm") and not re.search(rf"(^|[\s{{#]){name}:", examples[of_scene]):
+            sys.exit(f"the example of {'scenes' if of_scene else 'configurations'} does not show {key}")
+
+
 def paths_of(value, path=""):
     """Yields the place of each key in a JSON value; numbers and texts as keys are counted as one."""
     if isinstance(value, list):
@@ -237,13 +248,15 @@ def interface():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         os.chdir(folder)
+        keys = list(yaml_keys(folder))
+        check_examples(keys)
         sections = {
             "Functions of the shared libraries": [symbols("libdashpot_plugin.so"),
                                                   symbols("libdashpot_publisher.so")],
             "C headers": [*declarations("controller/plugin.h"),
                           *declarations("lcmtypes/plugin_publisher.h")],
             "LCM messages": messages(), "Command line": options(),
-            "YAML keys": by_place(yaml_keys(folder)), "JSON keys": by_place(json_keys(folder)),
+            "YAML keys": by_place(keys), "JSON keys": by_place(json_keys(folder)),
             "Python": python_names()}
         text = ""
         for title, lines in sections.items():
