@@ -242,25 +242,5 @@ TEST(TrackedPath, OfAPandaArmIsFollowedAtAnyDamping) {
   }
 }
 
-/// Each joint swings by half a radian in the same 2 s.
-TEST(TrackedPath, RoundAndRoundComesBackToTheSameModes) {
-  const SystemPath round = [](double t) {
-    VectorXd q = testing::swing(0);
-    for (Eigen::Index j = 0; j < 7; ++j) {
-      q[j] += 0.5 * std::sin(2 * std::numbers::pi * t + static_cast<double>(j));
-    }
-    return testing::panda_impedance(q, 0.1);
-  };
-  Follower follower;
-  follower.follow(round, 1);
-  const TrackedSpectrum start = *follower.spectrum;
-  for (int k = 0; k < 5; ++k) follower.follow(round, 2001, 1, 500);
-  ASSERT_EQ(follower.spectrum->mode_count, start.mode_count);
-  for (int i = 0; i < start.mode_count; ++i) {
-    const ModeNumbers &was = start.modes[static_cast<std::size_t>(i)], &is = follower.mode(i);
-    EXPECT_LE(std::abs(is.eigenvalues[0] - was.eigenvalues[0]), is.error_bound + was.error_bound);
-  }
-}
-
 }  // namespace
 }  // namespace dashpot::analysis

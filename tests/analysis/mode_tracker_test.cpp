@@ -9,7 +9,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <memory>
 
 namespace dashpot::analysis {
 namespace {
@@ -143,18 +142,6 @@ TEST(ModeTracker, SaysWhatIsWrongAndRecovers) {
     expect_failure(bad, status);
   }
   EXPECT_EQ(tracked.tracker->counters().failed, 7);
-}
-
-TEST(ModeTracker, NeverReusesASpectrumForAFactorThatIsNotFinite) {
-  const System<kMaxDof> good = panda_impedance(swing(0.1), 0.3);
-  for (const double value :
-       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-    Tracked tracked;
-    ASSERT_EQ(tracked.update(good), Status::kOk);
-    System<kMaxDof> bad = good;
-    bad.stiffness_factor(2, 3) = value;
-    EXPECT_EQ(tracked.update(bad), Status::kNotFinite);
-  }
 }
 
 /// A spectrum is used again for the factor that it belongs to, and for no earlier one.

@@ -68,23 +68,6 @@ TEST(RatioDampingOfJoints, MatchesTheDesignOfSetUpTime) {
   EXPECT_GT(beside, 25);
 }
 
-TEST(RatioDampingOfJoints, StartedFromTheLastConfigurationMatchesAColdStart) {
-  Random random(7302);
-  TaskImpedance arm = random_joints(random, 7);
-  arm.damping = testing::random_friction(random, 7, 2);
-  const MatrixXd swing = random.matrix(7, 7);
-  RatioDamping warm = damper_of(arm, 0.7);
-  for (int k = 0; k < 600; ++k) {
-    const MatrixXd R = MatrixXd::Identity(7, 7) + 0.3 * std::sin(0.01 * k) * swing;
-    const Matrix M = R * arm.mass * R.transpose();
-    RatioDamping cold = damper_of(arm, 0.7);
-    Matrix from_warm(7, 7), from_cold(7, 7);
-    ASSERT_EQ(warm.update(M, from_warm), Status::kOk);
-    ASSERT_EQ(cold.update(M, from_cold), Status::kOk);
-    EXPECT_TRUE(near(MatrixXd(from_warm), MatrixXd(from_cold), 1e-11 * from_cold.norm()));
-  }
-}
-
 TEST(RatioDampingOfJoints, SaysWhatIsWrongAndKeepsTheDampingBefore) {
   Random random(7303);
   const TaskImpedance arm = random_joints(random, 4);

@@ -1,5 +1,5 @@
-// Responses of systems made from known bases: initial conditions, the differential equation itself,
-// and the identities that tie the responses to each other. No solver takes part.
+// Responses of systems made from known bases, without a solver: initial conditions, receptances and
+// limits; response_oracle_test.cpp has the motions.
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/tests/support/made_to_measure.hpp>
 #include <dashpot/tests/support/matrices.hpp>
@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <functional>
 #include <limits>
 
 namespace dashpot::analysis {
@@ -50,49 +49,6 @@ TEST_P(ResponseOf, InitialConditionsAreMet) {
   EXPECT_EQ(struck.position, kNoForce);
   EXPECT_TRUE(near(response.step(f, 0).position, kNoForce, 0));
   EXPECT_TRUE(near(response.step(f, 0).velocity, kNoForce, 0));
-}
-
-/// |M q'' + C q' + K q - f| at random times, relative to the sum of the sizes of its terms. q''
-/// comes from the velocities by an eighth-order difference: its error is about (omega h)^8 / 630
-/// for a motion of frequency omega.
-TEST_P(ResponseOf, TheEquationIsSolved) {
-  const VectorXd q = random.vector(4), v = random.vector(4);
-  const System<>& system = made.system;
-  const auto expect_solved = [&](const std::function<Motion(double)>& motion,
-                                 const std::function<VectorXd(double)>& force) {
-    for (int i = 0; i < 20; ++i) {
-      const double t = random.log_uniform(0.02, 20), h = 1e-3;
-      const auto difference = [&](int k) -> VectorXd {
-        return motion(t + k * h).velocity - motion(t - k * h).velocity;
-      };
-      const VectorXd acceleration =
-          (672 * difference(1) - 168 * difference(2) + 32 * difference(3) - 3 * difference(4)) /
-          (840 * h);
-      const Motion now = motion(t);
-      const VectorXd residual = system.mass * acceleration + system.damping * now.velocity +
-                                system.stiffness * now.position - force(t);
-      EXPECT_LT(residual.norm(),
-                1e-10 * (system.mass.norm() * acceleration.norm() +
-                         system.damping.norm() * now.velocity.norm() +
-                         system.stiffness.norm() * now.position.norm() + force(t).norm()));
-    }
-  };
-  expect_solved([&](double t) { return response.free(q, v, t); }, [](double) { return kNoForce; });
-  expect_solved([&](double t) { return response.step(q, t); }, [&](double) { return q; });
-}
-
-TEST_P(ResponseOf, ResponsesAgreeWithEachOther) {
-  const VectorXd q = random.vector(4), v = random.vector(4), f = random.vector(4);
-  for (const double t : {1e-6, 0.01, 0.3, 2.0, 10.0}) {
-    const VectorXd expected = response.impulse(f, t).position;
-    EXPECT_TRUE(near(response.step(f, t).velocity, expected, 1e-11 * (1 + expected.norm())));
-  }
-  // Time may be cut in two.
-  const Motion half = response.free(q, v, 1.3), whole = response.free(q, v, 1.9);
-  const Motion two = response.free(half.position, half.velocity, 0.6);
-  const double size = whole.position.norm() + whole.velocity.norm();
-  EXPECT_TRUE(near(two.position, whole.position, 1e-11 * size));
-  EXPECT_TRUE(near(two.velocity, whole.velocity, 1e-11 * size));
 }
 
 TEST_P(ResponseOf, ReceptanceInvertsTheDynamicStiffness) {

@@ -1,7 +1,6 @@
 // The rates at which velocities along zero modes decay lie within their bounds.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
-#include <dashpot/tests/support/proved_eigenvalues.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
@@ -14,62 +13,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using testing::Random;
-
-/// Masses in a row, springs between them: the zero mode is (1, ..., 1).
-System<> free_chain(Random& random, int n) {
-  System<> chain(n);
-  for (int i = 0; i < n; ++i) chain.mass(i, i) = random.integer(1, 9);
-  for (int i = 0; i + 1 < n; ++i) {
-    const double k = random.integer(1, 1 << 20);
-    chain.stiffness.block<2, 2>(i, i) += (Eigen::Matrix2d() << k, -k, -k, k).finished();
-  }
-  return chain;
-}
-
-TEST(ZeroModeRates, OfDampingThatLeavesThemAloneAreWithinTheirBounds) {
-  Random random(2201);
-  for (const auto residual :
-       {SpectrumOptions::Residual::kWorking, SpectrumOptions::Residual::kExtended}) {
-    double largest = 0;
-    for (int trial = 0; trial < 200; ++trial) {
-      System<> chain = free_chain(random, random.integer(1, 6));
-      // Proportional to the mass: every motion of the chain as a whole decays at this rate.
-      const double rate = std::ldexp(random.integer(1, 1 << 20), random.integer(-30, 0));
-      chain.damping = rate * chain.mass;
-      SpectrumOptions options;
-      options.residual = residual;
-      const Spectrum<> spectrum = analyze(chain, options);
-      ASSERT_EQ(spectrum.zero_modes.count, 1);
-      const double bound = spectrum.zero_mode_rates_bound[0];
-      const double error = std::abs(spectrum.zero_mode_rates[0] + rate);
-      EXPECT_LE(error, bound) << "trial " << trial;
-      largest = std::max(largest, error / bound);
-    }
-    EXPECT_GT(largest, residual == SpectrumOptions::Residual::kWorking ? 1e-6 : 1e-3);
-  }
-}
-
-TEST(ZeroModeRates, OfDampingThatCouplesThemAreWithinTheirBounds) {
-  DASHPOT_NEEDS_PROVED_EIGENVALUES();
-  Random random(2202);
-  double largest = 0;
-  int real = 0;
-  for (int trial = 0; trial < 100; ++trial) {
-    const int n = random.integer(2, 5);
-    System<> chain = free_chain(random, n);
-    chain.damping(0, 0) = random.log_uniform(1e-3, 1e2);
-    const Spectrum<> spectrum = analyze(chain);
-    ASSERT_EQ(spectrum.zero_modes.count, 1);
-    if (std::isnan(spectrum.zero_mode_rates[0])) continue;
-    ++real;
-    const auto error = static_cast<double>(testing::distance_to_nearest(
-        Complex(spectrum.zero_mode_rates[0]), testing::proved_eigenvalues(chain)));
-    EXPECT_LE(error, spectrum.zero_mode_rates_bound[0]) << "trial " << trial;
-    largest = std::max(largest, error / spectrum.zero_mode_rates_bound[0]);
-  }
-  EXPECT_GT(real, 50);
-  EXPECT_GT(largest, 1e-6);
-}
 
 /// Springs and dampers in all directions but `zeros`, as J' (K_C J + C_C dJ/dt) and J' C_C J are,
 /// and `rate` along all motions.
