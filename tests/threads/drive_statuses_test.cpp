@@ -126,6 +126,7 @@ class DriveStatuses : public AtPace, public ::testing::WithParamInterface<Arm> {
       EXPECT_THAT(said, HasSubstr("nothing more is sent"));
     }
     if (!once.empty()) EXPECT_EQ(result["tick_statuses"][once], 1) << result.dump(2);
+    for (const DriverCommand& one : writer.commands) EXPECT_TRUE(one.torque.allFinite());
     const DriverCommand& last = writer.commands.back();
     EXPECT_TRUE(last.torque.size() == 7 && last.torque.isZero(0)) << last.torque.transpose();
     const bool panda = arm.kind == DriverKind::kPanda;
@@ -258,30 +259,6 @@ TEST_P(DriveStatuses, OthersThanOfThisArmAreNotAnswered) {
   const Json result = end();
   EXPECT_EQ(result["statuses"]["unreadable"], 5);
   EXPECT_EQ(result["faults"], 0);
-}
-
-/// The arm is pushed away, faster than the torque may change and further than it may be large.
-TEST_P(DriveStatuses, TorquesKeepToTheLimitsOfTheConfiguration) {
-  begin();
-  const double most = arm.kind == DriverKind::kIiwa ? 80 : 40;  // N m, of the first joint
-  double greatest = 0, steepest = 0, before = 0;
-  std::int64_t then = writer.next.utime;
-  for (int k = 0; k < 900; ++k) {
-    writer.next.position[0] += 1e-3;
-    writer.next.velocity[0] = 1;
-    if (!writer.step(100)) continue;
-    const DriverCommand& command = writer.commands.back();
-    const double change = std::abs(command.torque[0] - before);
-    const double time = 1e-6 * static_cast<double>(command.utime - then);
-    EXPECT_LE(change, kRate * time + 1e-9) << k;
-    EXPECT_LE(std::abs(command.torque[0]), most) << k;
-    steepest = std::max(steepest, change / time);
-    greatest = std::max(greatest, std::abs(command.torque[0]));
-    before = command.torque[0];
-    then = command.utime;
-  }
-  EXPECT_GT(steepest, 0.99 * kRate);
-  EXPECT_GT(greatest, 0.9 * most);
 }
 
 /// As the iiwa's are differenced here: over the time that has passed since the last position.

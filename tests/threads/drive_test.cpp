@@ -373,21 +373,6 @@ TEST_P(Drive, LatchesAfterAGap) {
   EXPECT_GE(result["statuses"]["lost"].get<int>(), 90);
 }
 
-/// Commands stay finite: the fake driver dies of anything else. The last one ends the motion.
-TEST_P(Drive, SendsNumbersToADriverThatReportsNone) {
-  // Not the gaps of a machine that is busy.
-  const Json result = troubled("nan", "200 ms", "1");
-  if (!seen) GTEST_SKIP() << kNoMulticast;
-  if (arm.kind == DriverKind::kPanda) {
-    EXPECT_THAT(fake_said, HasSubstr("a command expects control mode 0"));
-  } else {
-    EXPECT_EQ(fake_status, 0) << fake_said;
-  }
-  EXPECT_GE(result["tick_statuses"]["state not finite, torque ramped down"].get<int>(), 10);
-  EXPECT_THAT(result["ended"].get<std::string>(), HasSubstr("state not finite"));
-  EXPECT_EQ(result["faults"], 1);
-}
-
 /// No status is answered twice, and of reordered ones the newer, which are too few for the loop.
 TEST_P(Drive, AnswersNoStatusTwiceAndTheNewerOfReorderedOnes) {
   for (const bool reorder : {false, true}) {

@@ -265,13 +265,6 @@ TEST(Monitor, BearsTimesAndTicksOfAnySize) {
   EXPECT_THAT(outcome.out, HasSubstr("\n6 states and "));
 }
 
-TEST(Monitor, SaysThatALogIsEmpty) {
-  const Scratch scratch;
-  const Outcome outcome = run_program({"monitor", "--log", scratch.write("empty.lcm", "")});
-  EXPECT_EQ(outcome.status, 0);
-  EXPECT_THAT(outcome.out, StartsWith("\n0 states and 0 modes messages"));
-}
-
 TEST(Monitor, NamesWhatIsWrongWithItsInput) {
   const Scratch scratch;
   const std::string text = scratch.write("a.txt", std::string(200, 'x'));

@@ -1,12 +1,10 @@
 // The robot and its modes at a posture, from the plugin, without a loop and beside one.
-#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/plugin/panda_host.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -49,26 +47,6 @@ Found analyze(const Handle& arm, std::int32_t mode, const dashpot_gains* gains =
   return found;
 }
 
-/// The modes of `found` belong to its matrices.
-void expect_modes_of_the_matrices(const Found& found, std::uint32_t count) {
-  ASSERT_EQ(found.modes.status, 0);
-  ASSERT_EQ(found.modes.count, count);
-  EXPECT_EQ(found.modes.origin, DASHPOT_DIRECT);
-  EXPECT_EQ(Map<const VectorXd>(found.modes.position, 7), joint_vector(panda_posture()));
-  analysis::System<> system(7);
-  system.mass = rows(found.loop.mass, 7, 7);
-  system.damping = rows(found.loop.damping, 7, 7);
-  system.stiffness = rows(found.loop.stiffness, 7, 7);
-  const analysis::Spectrum<> expected = analysis::analyze(system);
-  ASSERT_EQ(expected.modes.size(), static_cast<int>(count));
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const dashpot_mode& mode = found.modes.modes[i];
-    const auto& wanted = expected.modes[static_cast<int>(i)];
-    EXPECT_NEAR(mode.natural_frequency, wanted.natural_frequency, 1e-9 * wanted.natural_frequency);
-    EXPECT_NEAR(mode.damping_ratio, wanted.damping_ratio, 1e-9);
-  }
-}
-
 TEST(PluginPosture, HasTheDynamicsOfTheRobot) {
   const Handle arm = create(panda());
   const std::vector<double> q = panda_posture();
@@ -88,43 +66,24 @@ TEST(PluginPosture, HasTheDynamicsOfTheRobot) {
   EXPECT_EQ(R, MatrixXd(expected.R_BT));
 }
 
-/// It finds without a loop the modes that a loop publishes once it has the gains.
-TEST(PluginPosture, FindsTheModesThatALoopPublishes) {
-  MatrixXd K = 100 * MatrixXd::Identity(7, 7), C = MatrixXd::Zero(7, 7);
-  C.diagonal() << 10, 10, 8, 8, 2, 2, 0.3;
+/// controller/loop_system_test.cpp compares them with the modes of a controller there.
+TEST(PluginPosture, HasTheLoopOfEitherMode) {
+  const Handle arm = create(panda());
+  MatrixXd K = 100 * MatrixXd::Identity(7, 7), C = 3 * MatrixXd::Identity(7, 7);
   K(1, 2) = K(2, 1) = 20;
   const MatrixXd friction = 0.003 * MatrixXd::Identity(7, 7);  // as in the URDF
   dashpot_gains gains = panda_gains();
   gains.joint_stiffness = K.data();
   gains.joint_damping = C.data();
-  for (const bool cartesian : {false, true}) {
-    Host host = panda_host(cartesian ? kCartesian : "");
-    const std::int32_t mode = cartesian ? DASHPOT_MODE_CARTESIAN : DASHPOT_MODE_JOINT;
-    const Found found = analyze(host.controller, mode, cartesian ? nullptr : &gains);
-    expect_modes_of_the_matrices(found, 7);
-    if (!cartesian) {
-      EXPECT_EQ(rows(found.loop.stiffness, 7, 7), K);
-      EXPECT_TRUE(near(rows(found.loop.damping, 7, 7), C + friction, 1e-12));
-      ASSERT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_OK);
-    }
-    for (int tick = 0; tick < 1200; ++tick) {
-      if (tick % 100 == 0 && !cartesian) {
-        const dashpot_setpoint stay = host.joint_setpoint(panda_posture());
-        ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &stay), DASHPOT_OK);
-      }
-      ASSERT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
-    }
-    const dashpot_modes published = host.modes();
-    ASSERT_EQ(published.count, found.modes.count);
-    EXPECT_EQ(published.zero_modes, found.modes.zero_modes);
-    for (std::uint32_t i = 0; i < published.count; ++i) {
-      const dashpot_mode &one = published.modes[i], &other = found.modes.modes[i];
-      EXPECT_LE(std::abs(one.natural_frequency - other.natural_frequency),
-                one.natural_frequency_bound + other.natural_frequency_bound);
-      EXPECT_LE(std::abs(one.damping_ratio - other.damping_ratio),
-                one.damping_ratio_bound + other.damping_ratio_bound);
-      EXPECT_EQ(one.kind, other.kind);
-    }
+  const Found joint = analyze(arm, DASHPOT_MODE_JOINT, &gains);
+  const Found tip = analyze(arm, DASHPOT_MODE_CARTESIAN, &gains);
+  EXPECT_EQ(rows(joint.loop.stiffness, 7, 7), K);
+  EXPECT_TRUE(near(rows(joint.loop.damping, 7, 7), C + friction, 1e-12));
+  EXPECT_FALSE(near(rows(tip.loop.stiffness, 7, 7), K, 1));
+  for (const Found& found : {joint, tip}) {
+    EXPECT_EQ(found.modes.count, 7u);
+    EXPECT_EQ(found.modes.origin, DASHPOT_DIRECT);
+    EXPECT_EQ(Map<const VectorXd>(found.modes.position, 7), joint_vector(panda_posture()));
   }
 }
 

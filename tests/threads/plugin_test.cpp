@@ -8,11 +8,8 @@
 #include <gmock/gmock.h>
 
 #include <array>
-#include <cstdio>
 #include <limits>
-#include <memory>
 #include <set>
-#include <sstream>
 #include <thread>
 
 namespace dashpot::tests {
@@ -23,32 +20,6 @@ using controller::Controller;
 using controller::JointVector;
 using Eigen::Map;
 using Eigen::VectorXd;
-
-TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
-  const std::string command = std::string("nm -D --defined-only '") + DASHPOT_PLUGIN + "'";
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(popen(command.c_str(), "r"), pclose);
-  ASSERT_TRUE(pipe);
-  std::set<std::string> names;
-  std::array<char, 512> line{};
-  while (std::fgets(line.data(), line.size(), pipe.get()) != nullptr) {
-    std::istringstream words(line.data());
-    std::string address;
-    std::string type;
-    std::string name;
-    words >> address >> type >> name;
-    names.insert(name);
-  }
-  EXPECT_THAT(
-      names,
-      ::testing::UnorderedElementsAre(
-          "dashpot_create", "dashpot_create_from_text", "dashpot_evaluate", "dashpot_analyze",
-          "dashpot_destroy", "dashpot_last_error", "dashpot_joints", "dashpot_joint_name",
-          "dashpot_period", "dashpot_update", "dashpot_start", "dashpot_reset", "dashpot_stop",
-          "dashpot_needs_brakes", "dashpot_release", "dashpot_judge_gains", "dashpot_set_setpoint",
-          "dashpot_set_gains", "dashpot_read_snapshot", "dashpot_read_modes",
-          "dashpot_read_sampled_modes", "dashpot_status_text", "dashpot_kind_text",
-          "dashpot_plugin_interface", "dashpot_set_payload", "dashpot_limit_tip_speed"));
-}
 
 TEST(Plugin, KnowsItsVersionOnly) {
   const PluginInterface interface = plugin_interface();
@@ -405,41 +376,6 @@ TEST(Plugin, HasNoModesAfterAReset) {
     EXPECT_EQ(modes.position[1], host.position[1]);
     EXPECT_EQ(modes.count, 7u);
   }
-}
-
-/// Six modes of the task with the held ratio, or with the ratios of a damping matrix again.
-TEST(Plugin, HoldsADampingRatio) {
-  Host host(create("robot: {urdf: " + urdf_path("panda.urdf") +
-                   ", base: panda_link0, tip: panda_hand_tcp, viscous_friction: 0}\n"
-                   "control: {mode: cartesian}\n"
-                   "gains: {null_space: {stiffness: 0, damping: 0}}\n"),
-            panda_posture());
-  dashpot_controller* const arm = host.controller.get();
-  const auto modes_with = [&](double ratio) {
-    for (int tick = 0; tick < 1000; ++tick) EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
-    const dashpot_modes modes = host.modes();
-    EXPECT_EQ(modes.count, 6u);
-    int count = 0;
-    for (std::uint32_t i = 0; i < modes.count; ++i) {
-      count += std::abs(modes.modes[i].damping_ratio - ratio) < 1e-6 ? 1 : 0;
-    }
-    return count;
-  };
-  double ratio = 0.4;
-  dashpot_gains gains = panda_gains();
-  gains.task_damping_ratio = &ratio;
-  ASSERT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
-  EXPECT_EQ(modes_with(0.4), 6);
-  for (const double wrong : {-0.1, 2.1, std::numeric_limits<double>::quiet_NaN()}) {
-    ratio = wrong;
-    EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
-    EXPECT_STREQ(plugin().last_error(), "task_damping_ratio is not between 0 and 2");
-  }
-  const Eigen::Matrix<double, 6, 6> C_C = Eigen::Matrix<double, 6, 6>::Identity();
-  gains.task_damping_ratio = nullptr;
-  gains.task_damping = C_C.data();  // ends the ratio
-  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
-  EXPECT_EQ(modes_with(0.4), 0);
 }
 
 }  // namespace
