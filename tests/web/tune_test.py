@@ -222,37 +222,36 @@ class Tune(unittest.TestCase):
                 payload,
                 'tool': f'drives: fr3, tool: {{position: [0, 0.02, 0.1], rpy: [0.1, 0.2, 0.3]}}, {payload}'}
         q = ['--q', '0,-0.785,0,-2.356,0,1.571,0.785']
-        for name, arm in arms.items():
-            for change in ('', 'state.a.arm = {reflected_inertia: Array(7).fill(0.3)}',
-                           'state.a.arm = {payload: {mass: 0, center: [0, 0, 0]}}'):
-                with self.subTest(name, change=change):
-                    path = self.file(f'{name}.yaml', f'robot: {{{PANDA}, {arm}}}\n{gains}'
-                                     'limits: {gain_margin: 1.5, velocity: 2}\nanalysis: {sampled: {delay: 1}}\n')
-                    self.open_other(path, *q)
-                    self.edit(f"state.edited = 'a'; {change}")
-                    modes, text, command, python = (self.value('dashpot.answers.a.modes'),
-                                                    self.text('configuration of Dashpot'), self.text('command'),
-                                                    self.text('Python'))
-                    told = run_python(python)
-                    if told is not None:
-                        self.same_modes(told, modes)
-                    self.assertIn(f'These keys replace keys of {path}', text)
-                    self.assertIn('gain_margin: 1.5', text)
-                    self.assertNotIn('integral', text)
-                    self.assertNotIn('cutoff', text)
-                    self.assertIn('reflected_inertia=[0.', python)
-                    self.assertIn('viscous_friction=[' if name != 'tool' else 'tool=[[', python)
-                    self.assertEqual('payload_mass=1.5' in python and 'payload_inertia=[[0.01,0,0.002]' in python,
-                                     'payload' not in change)
-                    lines = command.splitlines()
-                    count = 2 if name == 'tool' else 1
-                    self.assertEqual([line[0] == '#' for line in lines], [i < count for i in range(len(lines))])
-                    if name != 'tool':
-                        self.same_modes(self.audited(), modes)
-                    self.open_other(self.file('tuned.yaml', text), *q)
-                    self.same_modes(self.value('dashpot.answers.a.modes'), modes)
-                    self.assertEqual(self.value('[dashpot.store.state.a.delay, dashpot.store.state.a.gain_margin]'),
-                                     [1, 1.5])
+        rotors, bare = ('{reflected_inertia: Array(7).fill(0.3)}', '{payload: {mass: 0, center: [0, 0, 0]}}')
+        for name, change in (('tool', ''), ('rigid', rotors), ('gears', bare)):
+            with self.subTest(name, change=change):
+                path = self.file(f'{name}.yaml', f'robot: {{{PANDA}, {arms[name]}}}\n{gains}'
+                                 'limits: {gain_margin: 1.5, velocity: 2}\nanalysis: {sampled: {delay: 1}}\n')
+                self.open_other(path, *q)
+                self.edit("state.edited = 'a'" + (f'; state.a.arm = {change}' if change else ''))
+                modes, text, command, python = (self.value('dashpot.answers.a.modes'),
+                                                self.text('configuration of Dashpot'), self.text('command'),
+                                                self.text('Python'))
+                told = run_python(python)
+                if told is not None:
+                    self.same_modes(told, modes)
+                self.assertIn(f'These keys replace keys of {path}', text)
+                self.assertIn('gain_margin: 1.5', text)
+                self.assertNotIn('integral', text)
+                self.assertNotIn('cutoff', text)
+                self.assertIn('reflected_inertia=[0.', python)
+                self.assertIn('viscous_friction=[' if name != 'tool' else 'tool=[[', python)
+                self.assertEqual('payload_mass=1.5' in python and 'payload_inertia=[[0.01,0,0.002]' in python,
+                                 'payload' not in change)
+                lines = command.splitlines()
+                count = 2 if name == 'tool' else 1
+                self.assertEqual([line[0] == '#' for line in lines], [i < count for i in range(len(lines))])
+                if name != 'tool':
+                    self.same_modes(self.audited(), modes)
+                self.open_other(self.file('tuned.yaml', text), *q)
+                self.same_modes(self.value('dashpot.answers.a.modes'), modes)
+                self.assertEqual(self.value('[dashpot.store.state.a.delay, dashpot.store.state.a.gain_margin]'),
+                                 [1, 1.5])
 
     def test_mass_of_a_payload_takes_its_inertia_along(self):
         self.open_other(self.file('a.yaml',
