@@ -17,7 +17,9 @@ namespace dashpot::identification {
 namespace {
 
 using analysis::Mode;
+using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 using testing::Dice;
 using ::testing::HasSubstr;
 using testing::sensed;
@@ -37,7 +39,7 @@ Sensors noise_of(double noise, double missing = 0) {
 
 /// The modes found beside the true ones.
 struct Comparison {
-  int modes = 0, found = 0, frequencies_inside = 0, ratios_inside = 0, false_ones = 0;
+  int modes = 0, found = 0, false_ones = 0;
 
   void add(const std::vector<Mode<>>& truth, const Identification& result) {
     std::vector<int> claims(truth.size());
@@ -54,8 +56,6 @@ struct Comparison {
       ++found;
       const double dw = measured.natural_frequency - mode.natural_frequency;
       const double dz = measured.damping_ratio - mode.damping_ratio;
-      frequencies_inside += std::abs(dw) < 1.96 * measured.natural_frequency_std ? 1 : 0;
-      ratios_inside += std::abs(dz) < 1.96 * measured.damping_ratio_std ? 1 : 0;
       EXPECT_LT(std::abs(dw), 5 * measured.natural_frequency_std);
       EXPECT_LT(std::abs(dz), 5 * measured.damping_ratio_std);
     }
@@ -82,21 +82,6 @@ struct ShakenArm {
   SprungArm arm;
   MatrixXd motion;
 };
-
-/// `./run stress identify` counts how often intervals contain the truth.
-TEST(IdentifyAmbient, FindsTheModesOfShakenArmsWithinTheirDeviations) {
-  DASHPOT_SKIP_IF_QUICK();
-  Comparison all;
-  for (const std::uint64_t seed : {2U, 3U}) {
-    ShakenArm shaken(seed);
-    all.add(shaken.arm.modes, identify_ambient({shaken.record(1e-5, 0.002)}));
-  }
-  EXPECT_GE(all.found, 0.85 * all.modes);
-  EXPECT_GE(all.frequencies_inside, 0.85 * all.found);
-  EXPECT_GE(all.ratios_inside, 0.85 * all.found);
-  EXPECT_LT(all.frequencies_inside + all.ratios_inside, 2 * all.found);
-  EXPECT_LE(all.false_ones, 1);
-}
 
 /// Lag zero has the noise of the sensors, which no other lag has.
 TEST(IdentifyAmbient, DoesNotTakeTheSensorsNoiseForMotion) {
@@ -231,6 +216,88 @@ TEST(IdentifyAmbient, RefusesWhatIsTooShortOrRests) {
   EXPECT_THROW(identify_ambient({}), std::invalid_argument);
   const MatrixXd rest = MatrixXd::Constant(2, 20000, 0.3);
   EXPECT_THROW(identify_ambient({sensed(rest, 0.01, noise_of(0), draw)}), std::invalid_argument);
+}
+
+/// Six seconds of two modes, 9 rad/s at 0.12 and 24 rad/s at 0.8, that move already and that a
+/// chirp of 0.3 to 8 Hz moves, at 500 Hz; 3 % of the samples are missing.
+MotionRecord chirped(Dice& draw, double start, double noise = 1e-5) {
+  constexpr int kSamples = 3000;
+  constexpr double kStep = 0.002;
+  MotionRecord record{VectorXd(kSamples), MatrixXd(2, kSamples), MatrixXd(1, kSamples)};
+  struct Oscillator {
+    double w, z, x, v = 0;
+    void step(double u) {  // exactly, about u
+      const double d = w * std::sqrt(1 - z * z), y = x - u, b = (v + z * w * y) / d;
+      const double fade = std::exp(-z * w * kStep);
+      const double c = std::cos(d * kStep), s = std::sin(d * kStep);
+      const double next = fade * (y * c + b * s);
+      v = fade * (b * c - y * s) * d - z * w * next;
+      x = next + u;
+    }
+  };
+  Oscillator first{9, 0.12, start}, second{24, 0.8, -start};
+  for (int i = 0; i < kSamples; ++i) {
+    const double t = kStep * i, u = std::sin(2 * std::numbers::pi * t * (0.3 + 0.64 * t));
+    record.time[i] = t;
+    record.input(0, i) = 3 * u;
+    const bool missing = draw.uniform(0, 1) < 0.03;
+    record.output(0, i) = 0.3 + first.x + second.x / 2 + noise * draw.normal();
+    record.output(1, i) = -1 + first.x / 2 - second.x + noise * draw.normal();
+    if (missing) record.output.col(i).setConstant(std::numeric_limits<double>::quiet_NaN());
+    first.step(0.005 * u);
+    second.step(0.02 * u);
+  }
+  return record;
+}
+
+void expect_modes(const Identification& found) {
+  ASSERT_EQ(found.modes.size(), 2U);
+  const std::array<double, 2> w{9, 24}, z{0.12, 0.8};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const MeasuredMode& mode = found.modes[k];
+    EXPECT_NEAR(mode.natural_frequency, w[k], 3.5 * mode.natural_frequency_std);
+    EXPECT_NEAR(mode.damping_ratio, z[k], 3.5 * mode.damping_ratio_std);
+    EXPECT_LT(mode.natural_frequency_std, 2e-3 * w[k]);
+    EXPECT_LT(mode.damping_ratio_std, 2e-3);
+  }
+  EXPECT_NEAR(found.modes[0].shape[1].real() / found.modes[0].shape[0].real(), 0.5, 0.01);
+  EXPECT_NEAR(found.modes[1].shape[0].real() / found.modes[1].shape[1].real(), -0.5, 0.01);
+}
+
+TEST(IdentifyExcited, FindsModesInOneRecordAndInTwoBesideAChannelThatRests) {
+  Dice one(41);
+  expect_modes(identify_excited({chirped(one, 0.01)}));
+  Dice draw(42);
+  std::vector<MotionRecord> records{chirped(draw, 0.01), chirped(draw, -0.005)};
+  for (MotionRecord& record : records) {
+    record.output.conservativeResize(3, Eigen::NoChange);
+    record.output.row(2).setConstant(0.7);
+  }
+  for (Index i = 0; i < records[1].time.size(); ++i) records[1].time[i] += 7;
+  records[1] = part_of(records[1], 0, 2000);
+  const Identification found = identify_excited(records);
+  expect_modes(found);
+  EXPECT_EQ(found.modes[0].shape.size(), 3);
+  EXPECT_EQ(found.modes[0].shape[2], 0.0);
+  EXPECT_EQ(found.noise[2], 0);
+}
+
+TEST(IdentifyExcited, RefusesRecordsWithoutInputs) {
+  Dice draw(43);
+  const MotionRecord good = chirped(draw, 0);
+  const auto message = [](const MotionRecord& record) {
+    return testing::refusal<std::invalid_argument>([&] { identify_excited({record}); });
+  };
+  MotionRecord bad = good;
+  bad.input.resize(0, 0);
+  EXPECT_THAT(message(bad), HasSubstr("no inputs"));
+  bad = good;
+  bad.input.setConstant(2);
+  EXPECT_THAT(message(bad), HasSubstr("no input moves"));
+  bad.input(0, 5) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(message(bad), HasSubstr("not finite"));
+  bad.input.resize(1, 7);
+  EXPECT_THAT(message(bad), HasSubstr("inputs x samples"));
 }
 
 }  // namespace

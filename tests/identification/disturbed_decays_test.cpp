@@ -11,7 +11,6 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
-#include <vector>
 
 namespace dashpot::identification {
 namespace {
@@ -103,32 +102,6 @@ TEST(DisturbedDecays, AHumIsTakenAwayAndMakesNoAmbientMotion) {
     ASSERT_FALSE(found.rejected.empty());
     EXPECT_NEAR(found.rejected.back().natural_frequency, 100 * std::numbers::pi, 0.1);
     EXPECT_EQ(found.rejected.back().reason, "a steady hum, which was removed");
-  }
-}
-
-/// Whatever friction makes of a decay, none of it is a mode of ratio above 0.1 that is not there.
-TEST(DisturbedDecays, FrictionMakesNoModes) {
-  DASHPOT_SKIP_IF_QUICK();
-  for (const double friction : {0.02, 0.1}) {
-    SCOPED_TRACE(friction);
-    Dice draw(55);
-    std::array<double, 2> x{1, 1}, v{};
-    const auto rubbing = [&](const Oscillator& one, double) {
-      const std::size_t k = one.w < 20 ? 0 : 1;
-      const double now = x[k];
-      for (int part = 0; part < 20; ++part) {
-        const double stick = std::tanh(v[k] / 0.02) * friction;
-        v[k] -= 5e-5 * (one.w * one.w * (x[k] + stick) + 2 * one.z * one.w * v[k]);
-        x[k] += 5e-5 * v[k];
-      }
-      return now;
-    };
-    for (const MeasuredMode& mode :
-         identify_decays({record_of(2, 0.001, 1e-5, draw, rubbing)}).modes) {
-      const double w = mode.natural_frequency, deviation = mode.natural_frequency_std;
-      EXPECT_TRUE(std::abs(w - 9) < 0.9 + 2 * deviation || std::abs(w - 31) < 3.1 + 2 * deviation)
-          << w;
-    }
   }
 }
 
