@@ -223,7 +223,7 @@ class Tune(unittest.TestCase):
                 'tool': f'drives: fr3, tool: {{position: [0, 0.02, 0.1], rpy: [0.1, 0.2, 0.3]}}, {payload}'}
         q = ['--q', '0,-0.785,0,-2.356,0,1.571,0.785']
         rotors, bare = ('{reflected_inertia: Array(7).fill(0.3)}', '{payload: {mass: 0, center: [0, 0, 0]}}')
-        for name, change in (('tool', ''), ('rigid', rotors), ('gears', bare)):
+        for name, change in (('tool', ''), ('gears', rotors), ('rigid', bare)):
             with self.subTest(name, change=change):
                 path = self.file(f'{name}.yaml', f'robot: {{{PANDA}, {arms[name]}}}\n{gains}'
                                  'limits: {gain_margin: 1.5, velocity: 2}\nanalysis: {sampled: {delay: 1}}\n')
