@@ -3,7 +3,6 @@
 #include <dashpot/controller/contact_audit.hpp>
 #include <dashpot/tests/support/linear_system.hpp>
 #include <dashpot/tests/support/mujoco_arm.hpp>
-#include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/twin_models.hpp>
 
@@ -88,7 +87,7 @@ void expect_turn(double limit, const Growth& growth) {
 /// Seven joints, rigid and elastic, as masses on springs.
 TEST(Contact, MassesTurnWhereTheLimitIs) {
   int compared = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
     Random random(seed);
     const TouchedPanda panda(random, static_cast<int>(seed % 5), seed % 2 == 0);
     const controller::Audit audit(panda.model(), panda.stated);
@@ -126,8 +125,8 @@ TEST(Contact, MassesTurnWhereTheLimitIs) {
     });
     ++compared;
   }
-  std::printf("%d of 40 loops\n", compared);
-  EXPECT_GE(compared, 18);
+  std::printf("%d of 16 loops\n", compared);
+  EXPECT_GE(compared, 7);
 }
 
 /// The coarse steps in all directions but the first miss no lower limit.
