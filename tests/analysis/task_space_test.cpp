@@ -47,9 +47,9 @@ TEST(ToJointSpace, PaperAppendix3DampingAndStiffnessOfTheArm) {
 TEST(ToJointSpace, TailsHoldWhatRoundingTook) {
   // Entries are multiples of 2^-30 below 1, so products of three are multiples of 2^-90, which
   // 128-bit integers hold exactly.
-  __extension__ using Wide = __int128;
+  __extension__ using Whole = __int128;
   const auto integer = [](double value, int bits) {
-    return static_cast<Wide>(std::ldexp(value, bits));
+    return static_cast<Whole>(std::ldexp(value, bits));
   };
   testing::Random random(21);
   const auto coarse = [&](int rows, int cols) {
@@ -68,7 +68,7 @@ TEST(ToJointSpace, TailsHoldWhatRoundingTook) {
   EXPECT_FALSE(system.stiffness_low.isZero(0.0));
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      Wide exact = 0;
+      Whole exact = 0;
       for (int k = 0; k < 2; ++k) {
         for (int l = 0; l < 2; ++l) {
           exact += integer(J(k, i), 30) * integer(K(k, l), 30) * integer(J(l, j), 30);
