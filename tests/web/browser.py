@@ -14,6 +14,9 @@ def find():
     return shutil.which('chromium') or shutil.which('chromium-browser')
 
 
+HANG = 1200  # s, longer than a busy machine takes for anything
+
+
 class Browser:
     """A Chromium of its own with one page."""
 
@@ -64,7 +67,7 @@ class Browser:
             ready, _, _ = select.select([self.back], [], [], max(0, end - time.monotonic()))
             part = os.read(self.back, 1 << 16) if ready else b''
             if not part:
-                raise RuntimeError('Chromium does not answer')
+                raise RuntimeError('Chromium does not answer' if not ready else 'Chromium has ended')
             self.buffer += part
         text, self.buffer = self.buffer.split(b'\0', 1)
         return json.loads(text)
@@ -75,7 +78,7 @@ class Browser:
         if self.session:
             message['sessionId'] = self.session
         os.write(self.to, json.dumps(message).encode() + b'\0')
-        end = time.monotonic() + 60
+        end = time.monotonic() + HANG
         while True:
             answer = self._message(end)
             if answer.get('id') == self.number:
@@ -99,7 +102,7 @@ class Browser:
             raise RuntimeError(str(answer['exceptionDetails']))
         return answer['result'].get('value')
 
-    def until(self, expression, seconds=1200):
+    def until(self, expression, seconds=HANG):
         """Waits until an expression is true; raises RuntimeError if it does not become so."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -111,7 +114,7 @@ class Browser:
                            + str(self.value('JSON.stringify(window.dashpot?.errors)')))
 
     @staticmethod
-    def eventually(check, seconds=1200):
+    def eventually(check, seconds=HANG):
         """Returns what `check` returns as soon as it raises no AssertionError."""
         end = time.monotonic() + seconds
         while True:
