@@ -4,19 +4,17 @@
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/text/setting_reader.hpp>
 
-#include <array>
 #include <filesystem>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace dashpot::controller {
 
 /// Sections of a configuration file. What stands under the last three is for the program that runs
 /// the controller.
-inline constexpr std::array<std::string_view, 13> kConfigSections = {
-    "robot",    "control",  "environment", "gains",    "limits",     "motion",  "feed_forward",
-    "integral", "watchdog", "analysis",    "commands", "simulation", "scenario"};
+inline constexpr auto kConfigSections =
+    text::key_list("robot", "control", "environment", "gains", "limits", "motion", "feed_forward",
+                   "integral", "watchdog", "analysis", "commands", "simulation", "scenario");
 
 /// Contents of a configuration file. controller/examples/panda.yaml has all keys with their units
 /// and defaults.

@@ -4,7 +4,7 @@
 
 #include <dashpot/text/aligned_eigen.hpp>
 #include <dashpot/text/range.hpp>
-#include <dashpot/text/yaml_mapping.hpp>
+#include <dashpot/text/yaml_document.hpp>
 
 #include <array>
 #include <limits>

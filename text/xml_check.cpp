@@ -5,8 +5,6 @@
 #include <array>
 #include <stdexcept>
 #include <string>
-#include <utility>
-#include <vector>
 
 namespace dashpot::text {
 namespace {

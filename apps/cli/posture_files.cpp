@@ -2,7 +2,6 @@
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/text/yaml_document.hpp>
-#include <dashpot/text/yaml_mapping.hpp>
 
 #include <array>
 #include <fstream>
@@ -27,7 +26,7 @@ std::vector<JointVector> read_postures(const std::string& path, int n) try {
     holder.kind = text::YamlNode::Kind::kMap;
     holder.line = item.line;
     holder.items = {key, item};
-    static constexpr std::array<std::string_view, 1> kKeys = {"posture"};
+    static constexpr auto kKeys = text::key_list("posture");
     const text::YamlMapping mapping(holder, "[" + std::to_string(postures.size()) + "].", kKeys);
     const Eigen::VectorXd q = *mapping.vector("posture");
     if (q.size() != n) {

@@ -2,7 +2,6 @@
 #include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/text/setting_reader.hpp>
 #include <dashpot/text/yaml_document.hpp>
-#include <dashpot/text/yaml_mapping.hpp>
 
 #include <Eigen/Cholesky>
 #include <array>
@@ -18,26 +17,11 @@ namespace {
 using text::YamlMapping;
 using text::YamlNode;
 
-constexpr std::array<std::string_view, 20> kKeys = {"mass",
-                                                    "damping",
-                                                    "stiffness",
-                                                    "jacobian",
-                                                    "task_damping",
-                                                    "task_stiffness",
-                                                    "jacobian_rate",
-                                                    "jacobian_derivatives",
-                                                    "wrench",
-                                                    "reflected_inertia",
-                                                    "gear_stiffness",
-                                                    "gear_damping",
-                                                    "position_sensor",
-                                                    "payload",
-                                                    "null_damping",
-                                                    "initial_position",
-                                                    "initial_velocity",
-                                                    "impulse",
-                                                    "force",
-                                                    "times"};
+constexpr auto kKeys =
+    text::key_list("mass", "damping", "stiffness", "jacobian", "task_damping", "task_stiffness",
+                   "jacobian_rate", "jacobian_derivatives", "wrench", "reflected_inertia",
+                   "gear_stiffness", "gear_damping", "position_sensor", "payload", "null_damping",
+                   "initial_position", "initial_velocity", "impulse", "force", "times");
 
 std::optional<Eigen::VectorXd> joint_vector(const YamlMapping& keys, std::string_view key,
                                             Eigen::Index n) {

@@ -27,25 +27,11 @@ void read_at_most(const YamlMapping& keys, const char* key, const char* unit, do
 }  // namespace
 
 void read_commands(const YamlMapping& root, lcmtypes::CommandLimits& limits) {
-  static constexpr std::array<std::string_view, 19> kKeys = {"reach",
-                                                             "force",
-                                                             "torque",
-                                                             "joint_stiffness",
-                                                             "joint_damping",
-                                                             "task_stiffness",
-                                                             "task_damping",
-                                                             "damping_ratio",
-                                                             "payload",
-                                                             "payload_distance",
-                                                             "tool_distance",
-                                                             "linear_velocity",
-                                                             "angular_velocity",
-                                                             "tip_velocity",
-                                                             "oldest",
-                                                             "furthest",
-                                                             "silence",
-                                                             "most_per_second",
-                                                             "burst"};
+  static constexpr auto kKeys =
+      text::key_list("reach", "force", "torque", "joint_stiffness", "joint_damping",
+                     "task_stiffness", "task_damping", "damping_ratio", "payload",
+                     "payload_distance", "tool_distance", "linear_velocity", "angular_velocity",
+                     "tip_velocity", "oldest", "furthest", "silence", "most_per_second", "burst");
   const YamlMapping keys = root.mapping("commands", kKeys);
   read_number(keys, "reach", "m", kPositive, limits.reach);
   read_number(keys, "force", "N", kNotNegative, limits.force);

@@ -55,9 +55,9 @@ bool read_loop_fault(const YamlMapping& keys, const Units& positions, LoopFault&
 }  // namespace
 
 void read_faults(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 10> kKeys = {
-      "begin",        "end",          "position_offset", "velocity_factor", "frozen",
-      "not_a_number", "clock_offset", "call_every",      "pause",           "moved_by"};
+  static constexpr auto kKeys =
+      text::key_list("begin", "end", "position_offset", "velocity_factor", "frozen", "not_a_number",
+                     "clock_offset", "call_every", "pause", "moved_by");
   for (const YamlMapping& keys : mappings(scenario, "faults", kKeys)) {
     require(keys, "begin", scenario, "faults");
     sim::SensorFault sensors;

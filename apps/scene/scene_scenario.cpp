@@ -100,8 +100,8 @@ void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
 }
 
 void read_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 5> kKeys = {
-      "position", "velocity", "joint_displacement", "tip_displacement", "outside_limits"};
+  static constexpr auto kKeys = text::key_list("position", "velocity", "joint_displacement",
+                                               "tip_displacement", "outside_limits");
   const YamlMapping keys = scenario.mapping("start", kKeys);
   read_switch(keys, "outside_limits", scene.outside_limits);
   require(keys, "position", scenario, "start");
@@ -149,7 +149,7 @@ void read_start(const YamlMapping& scenario, const Units& positions, Scene& scen
 }
 
 void read_pushes(const YamlMapping& scenario, Scene& scene) {
-  static constexpr std::array<std::string_view, 3> kKeys = {"begin", "end", "wrench"};
+  static constexpr auto kKeys = text::key_list("begin", "end", "wrench");
   for (const YamlMapping& keys : mappings(scenario, "pushes", kKeys)) {
     sim::Piece<sim::Vector6> piece;
     for (const char* key : {"begin", "end", "wrench"}) require(keys, key, scenario, "pushes");
@@ -161,8 +161,7 @@ void read_pushes(const YamlMapping& scenario, Scene& scene) {
 
 /// Reads bodies that the arm picks up and puts down again, in addition to its payload.
 void read_loads(const YamlMapping& scenario, Scene& scene) {
-  static constexpr std::array<std::string_view, 5> kKeys = {"begin", "end", "mass", "center",
-                                                            "inertia"};
+  static constexpr auto kKeys = text::key_list("begin", "end", "mass", "center", "inertia");
   for (const YamlMapping& keys : mappings(scenario, "loads", kKeys)) {
     sim::Piece<sim::Inertia> piece;
     piece.end = std::numeric_limits<double>::infinity();
@@ -176,7 +175,7 @@ void read_loads(const YamlMapping& scenario, Scene& scene) {
 
 /// Reads scenario.tables: the stiffness and damping of the wall from `begin` to `end`.
 void read_tables(const YamlMapping& scenario, Scene& scene) {
-  static constexpr std::array<std::string_view, 4> kKeys = {"begin", "end", "stiffness", "damping"};
+  static constexpr auto kKeys = text::key_list("begin", "end", "stiffness", "damping");
   sim::ArmOptions& options = scene.arm->options;
   if (scenario.has("tables") && !options.wall) {
     throw scenario.error("tables", "need simulation.wall, which is their place");
@@ -203,10 +202,9 @@ controller::Setpoint first_setpoint(const Scene& scene) {
 }
 
 void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 8> kKeys = {
-      "at",     "mode",  "joint_position", "tip_displacement",
-      "wrench", "gains", "null_projector", "payload"};
-  static constexpr std::array<std::string_view, 3> kPayload = {"mass", "center", "inertia"};
+  static constexpr auto kKeys = text::key_list("at", "mode", "joint_position", "tip_displacement",
+                                               "wrench", "gains", "null_projector", "payload");
+  static constexpr auto kPayload = text::key_list("mass", "center", "inertia");
   static constexpr std::array<std::pair<std::string_view, controller::Mode>, 2> kModes = {
       {{"joint", controller::Mode::kJoint}, {"cartesian", controller::Mode::kCartesian}}};
   const RobotModel& model = scene.arm->config.model;
@@ -296,8 +294,8 @@ std::optional<JointVector> displaced(const RobotModel& model, const JointVector&
 }
 
 void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 8> kKeys = {
-      "duration", "start", "pushes", "loads", "tables", "steps", "faults", "ring_down"};
+  static constexpr auto kKeys = text::key_list("duration", "start", "pushes", "loads", "tables",
+                                               "steps", "faults", "ring_down");
   const YamlMapping keys = root.mapping("scenario", kKeys);
   read_number(keys, "duration", "s", kPositive, scene.duration);
   if (scene.duration > kLongest) throw keys.error("duration", "is more than 1e7 s");

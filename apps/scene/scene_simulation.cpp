@@ -35,8 +35,8 @@ void read_joint_option(const YamlMapping& keys, std::string_view key, const Unit
 
 void read_integrator(const YamlMapping& simulation, double period,
                      sim::IntegratorOptions& options) {
-  static constexpr std::array<std::string_view, 5> kKeys = {
-      "method", "step", "adaptive", "absolute_tolerance", "relative_tolerance"};
+  static constexpr auto kKeys =
+      text::key_list("method", "step", "adaptive", "absolute_tolerance", "relative_tolerance");
   static constexpr std::array<std::pair<std::string_view, sim::Method>, 5> kMethods = {
       {{"semi_implicit_euler", sim::Method::kSemiImplicitEuler},
        {"rk4", sim::Method::kRungeKutta4},
@@ -60,7 +60,7 @@ void read_integrator(const YamlMapping& simulation, double period,
 }
 
 void read_drives(const YamlMapping& simulation, const Units& positions, sim::PlantOptions& plant) {
-  static constexpr std::array<std::string_view, 3> kKeys = {"torque_limit", "delay", "cutoff"};
+  static constexpr auto kKeys = text::key_list("torque_limit", "delay", "cutoff");
   const YamlMapping keys = simulation.mapping("drives", kKeys);
   read_joint_option(keys, "torque_limit", joint_units(positions, "N m", "N"), kPositive,
                     plant.torque_limit);
@@ -70,8 +70,8 @@ void read_drives(const YamlMapping& simulation, const Units& positions, sim::Pla
 }
 
 void read_sensors(const YamlMapping& simulation, const Units& positions, sim::PlantOptions& plant) {
-  static constexpr std::array<std::string_view, 4> kKeys = {
-      "position_noise", "velocity_noise", "position_resolution", "difference_velocity"};
+  static constexpr auto kKeys = text::key_list("position_noise", "velocity_noise",
+                                               "position_resolution", "difference_velocity");
   const YamlMapping keys = simulation.mapping("sensors", kKeys);
   read_joint_option(keys, "position_noise", positions, kNotNegative, plant.position_noise);
   read_joint_option(keys, "velocity_noise", joint_units(positions, "rad/s", "m/s"), kNotNegative,
@@ -82,10 +82,9 @@ void read_sensors(const YamlMapping& simulation, const Units& positions, sim::Pl
 }
 
 void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimulation& arm) {
-  static constexpr std::array<std::string_view, 9> kKeys = {
-      "drives",           "reflected_inertia", "viscous_friction",
-      "coulomb_friction", "gear_stiffness",    "gear_damping",
-      "position_sensor",  "friction_velocity", "payload"};
+  static constexpr auto kKeys = text::key_list("drives", "reflected_inertia", "viscous_friction",
+                                               "coulomb_friction", "gear_stiffness", "gear_damping",
+                                               "position_sensor", "friction_velocity", "payload");
   static constexpr std::array<std::pair<std::string_view, sim::PositionSensor>, 2> kSensors = {
       {{"motor", sim::PositionSensor::kMotor}, {"link", sim::PositionSensor::kLink}}};
   const YamlMapping keys = simulation.mapping("robot", kKeys);
@@ -116,16 +115,15 @@ void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimula
                     kNotNegative, parameters.gear_damping);
   read_choice(keys, "position_sensor", kSensors, arm.options.position_sensor);
   read_number(keys, "friction_velocity", "rad/s", kPositive, arm.options.friction_velocity);
-  static constexpr std::array<std::string_view, 3> kPayload = {"mass", "center", "inertia"};
+  static constexpr auto kPayload = text::key_list("mass", "center", "inertia");
   const YamlMapping payload = keys.mapping("payload", kPayload);
   read_body(payload, parameters.payload.mass, parameters.payload.center,
             parameters.payload.about_center);
 }
 
 void read_surroundings(const YamlMapping& simulation, sim::ArmOptions& options) {
-  static constexpr std::array<std::string_view, 2> kStopKeys = {"stiffness", "damping"};
-  static constexpr std::array<std::string_view, 4> kWallKeys = {"point", "normal", "stiffness",
-                                                                "damping"};
+  static constexpr auto kStopKeys = text::key_list("stiffness", "damping");
+  static constexpr auto kWallKeys = text::key_list("point", "normal", "stiffness", "damping");
   if (simulation.has("stops")) {
     options.stops = sim::Contact{2000, 20};
     read_contact(simulation.mapping("stops", kStopKeys), "N m/rad", "N m s/rad", *options.stops);
@@ -150,8 +148,8 @@ void read_contact(const YamlMapping& keys, const char* stiffness, const char* da
 
 void read_simulation(const YamlMapping& root, const Units& positions, sim::PlantOptions& plant,
                      ArmSimulation& arm) {
-  static constexpr std::array<std::string_view, 7> kKeys = {
-      "integrator", "drives", "sensors", "seed", "robot", "stops", "wall"};
+  static constexpr auto kKeys =
+      text::key_list("integrator", "drives", "sensors", "seed", "robot", "stops", "wall");
   const YamlMapping keys = root.mapping("simulation", kKeys);
   plant.integrator.max_step = plant.period;
   read_robot(keys, positions, arm);

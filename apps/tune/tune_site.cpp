@@ -84,7 +84,7 @@ const Json& wanted(const Json& asked, const char* key) {
 }
 
 controller::JointVector posture(const Json& told, const controller::RobotModel& model) {
-  static constexpr std::array<std::string_view, 1> kKeys = {"q"};
+  static constexpr auto kKeys = text::key_list("q");
   const text::YamlNode document = yaml_of({{"q", told}});
   const text::YamlMapping keys(document, "", kKeys);
   if (!keys.has("q")) throw keys.error("q", "missing");

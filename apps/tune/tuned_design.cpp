@@ -53,7 +53,7 @@ Json without_nulls(Json json, int depth = 0) {
 /// Returns the gains of one part as a configuration has them. {"ratio": Z} is its damping_ratio;
 /// F of {"factor": F}, of sqrt(stiffness), is left to `factor`.
 Json part_of(const Json& design, const char* stiffness, const char* damping, double& factor) {
-  static constexpr std::array<std::string_view, 2> kKeys = {"factor", "ratio"};
+  static constexpr auto kKeys = text::key_list("factor", "ratio");
   Json part = Json::object();
   if (design.contains(stiffness)) part["stiffness"] = design[stiffness];
   if (!design.contains(damping)) return part;
@@ -80,7 +80,7 @@ Matrix of_root(double factor, const Matrix& K) {
 }
 
 controller::Gains gains_of(const Json& design, const controller::RobotModel& model) {
-  static constexpr std::array<std::string_view, 1> kKeys = {"gains"};
+  static constexpr auto kKeys = text::key_list("gains");
   double task = 0, joint = 0, null_space = 0;
   Json parts = {{"task", part_of(design, "stiffness", "damping", task)},
                 {"joint", part_of(design, "joint_stiffness", "joint_damping", joint)},
@@ -181,9 +181,8 @@ TunedArm::TunedArm(controller::RobotDescription robot, const controller::Setting
 }
 
 TunedArm TunedArm::with(const Json& parts) const {
-  static constexpr std::array<std::string_view, 6> kKeys = {"payload",          "reflected_inertia",
-                                                            "viscous_friction", "gear_stiffness",
-                                                            "gear_damping",     "position_sensor"};
+  static constexpr auto kKeys = text::key_list("payload", "reflected_inertia", "viscous_friction",
+                                               "gear_stiffness", "gear_damping", "position_sensor");
   const YamlNode document = yaml_of(parts);
   const YamlMapping keys(document, "arm.", kKeys);
   controller::RobotDescription robot = robot_;
@@ -200,26 +199,11 @@ bool TunedDesign::designed() const {
 }
 
 TunedDesign read_design(const TunedArm& arm, const Json& design) {
-  static constexpr std::array<std::string_view, 20> kKeys = {"mode",
-                                                             "frame",
-                                                             "stiffness",
-                                                             "damping",
-                                                             "joint_stiffness",
-                                                             "joint_damping",
-                                                             "null_stiffness",
-                                                             "null_damping",
-                                                             "null_projector",
-                                                             "null_weights",
-                                                             "rotation",
-                                                             "inertia_blocks",
-                                                             "period",
-                                                             "delay",
-                                                             "cutoff",
-                                                             "difference_velocity",
-                                                             "integral_time",
-                                                             "ideal_gravity",
-                                                             "gain_margin",
-                                                             "arm"};
+  static constexpr auto kKeys =
+      text::key_list("mode", "frame", "stiffness", "damping", "joint_stiffness", "joint_damping",
+                     "null_stiffness", "null_damping", "null_projector", "null_weights", "rotation",
+                     "inertia_blocks", "period", "delay", "cutoff", "difference_velocity",
+                     "integral_time", "ideal_gravity", "gain_margin", "arm");
   const YamlNode document = yaml_of(design);
   const YamlMapping keys(document, "", kKeys);
   TunedDesign result;

@@ -174,7 +174,7 @@ void read_period(const text::YamlMapping& control, Settings& settings) {
 }
 
 void read_walls(const text::YamlMapping& limits, std::vector<Wall>& walls) {
-  static constexpr std::array<std::string_view, 2> kKeys = {"point", "normal"};
+  static constexpr auto kKeys = text::key_list("point", "normal");
   const text::YamlNode* list = limits.find("walls");
   if (list == nullptr) return;
   if (list->kind != text::YamlNode::Kind::kSequence) {

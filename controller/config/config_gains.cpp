@@ -30,7 +30,7 @@ void read_ratio(const text::YamlMapping& keys, double& ratio) {
 }
 
 void read_directions(const text::YamlMapping& task, std::array<bool, 6>& directions) {
-  static constexpr std::array<std::string_view, 6> kWords = {"x", "y", "z", "rx", "ry", "rz"};
+  static constexpr auto kWords = text::key_list("x", "y", "z", "rx", "ry", "rz");
   const text::YamlNode* node = task.find("directions");
   if (node == nullptr) return;
   if (node->kind != text::YamlNode::Kind::kSequence) {
@@ -49,11 +49,10 @@ void read_directions(const text::YamlMapping& task, std::array<bool, 6>& directi
 
 void read_gains(const text::YamlMapping& parent, const RobotModel& model, GainPairs pairs,
                 Gains& gains) {
-  static constexpr std::array<std::string_view, 3> kKeys = {"joint", "task", "null_space"};
-  static constexpr std::array<std::string_view, 3> kJointKeys = {"stiffness", "damping",
-                                                                 "damping_ratio"};
-  static constexpr std::array<std::string_view, 5> kTaskKeys = {
-      "stiffness", "damping", "damping_ratio", "frame", "directions"};
+  static constexpr auto kKeys = text::key_list("joint", "task", "null_space");
+  static constexpr auto kJointKeys = text::key_list("stiffness", "damping", "damping_ratio");
+  static constexpr auto kTaskKeys =
+      text::key_list("stiffness", "damping", "damping_ratio", "frame", "directions");
   const text::YamlMapping keys = parent.mapping("gains", kKeys);
   const auto require = [pairs](const text::YamlMapping& part) {
     if (pairs == GainPairs::kTogether) require_pair(part);

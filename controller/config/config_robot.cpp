@@ -9,7 +9,7 @@ namespace dashpot::controller {
 namespace {
 
 void read_payload(const text::YamlMapping& robot, Payload& payload) {
-  static constexpr std::array<std::string_view, 3> kKeys = {"mass", "center", "inertia"};
+  static constexpr auto kKeys = text::key_list("mass", "center", "inertia");
   const text::YamlMapping keys = robot.mapping("payload", kKeys);
   read_number(keys, "mass", "kg", text::kNotNegative, payload.mass);
   read_vector3(keys, "center", "m", payload.center);
@@ -22,7 +22,7 @@ void read_payload(const text::YamlMapping& robot, Payload& payload) {
 void read_tool(const text::YamlMapping& robot, Pose& tool) {
   using Eigen::AngleAxisd;
   using Eigen::Vector3d;
-  static constexpr std::array<std::string_view, 2> kKeys = {"position", "rpy"};
+  static constexpr auto kKeys = text::key_list("position", "rpy");
   const text::YamlMapping keys = robot.mapping("tool", kKeys);
   Vector3d rpy = Vector3d::Zero();
   read_vector3(keys, "position", "m", tool.position);
@@ -133,23 +133,11 @@ void read_joint_options(const text::YamlMapping& keys, const RobotModel& model,
 
 RobotDescription read_robot(const text::YamlMapping& root, const std::filesystem::path& directory,
                             const std::string& text) try {
-  static constexpr std::array<std::string_view, 17> kKeys = {"urdf",
-                                                             "base",
-                                                             "tip",
-                                                             "gravity",
-                                                             "include_off_chain",
-                                                             "accept_inertias",
-                                                             "reflected_inertia",
-                                                             "drives",
-                                                             "drives_friction",
-                                                             "viscous_friction",
-                                                             "coulomb_friction",
-                                                             "torque_loop_inertia_ratio",
-                                                             "gear_stiffness",
-                                                             "gear_damping",
-                                                             "position_sensor",
-                                                             "payload",
-                                                             "tool"};
+  static constexpr auto kKeys =
+      text::key_list("urdf", "base", "tip", "gravity", "include_off_chain", "accept_inertias",
+                     "reflected_inertia", "drives", "drives_friction", "viscous_friction",
+                     "coulomb_friction", "torque_loop_inertia_ratio", "gear_stiffness",
+                     "gear_damping", "position_sensor", "payload", "tool");
   const text::YamlMapping keys = root.mapping("robot", kKeys);
   RobotDescription robot;
   robot.urdf = directory / required_text(root, keys, "urdf");

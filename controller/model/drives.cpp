@@ -121,8 +121,8 @@ void read_figures(const text::YamlMapping& keys, std::string_view key, const cha
 }
 
 void read_drives(const std::string& text, FileDrives& file) {
-  static constexpr std::array<std::string_view, 5> kKeys = {"reflected_inertia", "viscous_friction",
-                                                            "coulomb_friction", "source", "doubt"};
+  static constexpr auto kKeys = text::key_list("reflected_inertia", "viscous_friction",
+                                               "coulomb_friction", "source", "doubt");
   const text::YamlNode document = text::parse_yaml(text);
   const text::YamlMapping keys(document, "", kKeys);
   const text::YamlNode* const list = keys.find("reflected_inertia");
