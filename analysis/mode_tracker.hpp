@@ -1,7 +1,6 @@
 #pragma once
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/tracked_spectrum.hpp>
-#include <dashpot/analysis/tracker/basis_extrapolation.hpp>
 #include <dashpot/analysis/tracker/mode_labels.hpp>
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 

@@ -1,9 +1,5 @@
-#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/enclosure.hpp>
-
-#include <algorithm>
-#include <cmath>
 
 namespace dashpot::analysis {
 namespace {

@@ -1,6 +1,7 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
+#include <dashpot/analysis/mode.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 #include <dashpot/analysis/spectrum/modes.hpp>
 
@@ -9,6 +10,27 @@
 #include <limits>
 
 namespace dashpot::analysis {
+
+const char* to_text(ModeKind kind) noexcept {
+  switch (kind) {
+    case ModeKind::kUnderdamped:
+      return "underdamped";
+    case ModeKind::kCritical:
+      return "critical";
+    case ModeKind::kOverdamped:
+      return "overdamped";
+    case ModeKind::kUndamped:
+      return "undamped";
+    case ModeKind::kUnstable:
+      return "unstable";
+    case ModeKind::kSoft:
+      return "soft";
+    case ModeKind::kAlternating:
+      return "alternating";
+  }
+  return "unknown";
+}
+
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

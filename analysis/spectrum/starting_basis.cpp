@@ -1,6 +1,5 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
-#include <dashpot/analysis/spectrum/cluster_split.hpp>
 #include <dashpot/analysis/spectrum/core_eigenvalues.hpp>
 #include <dashpot/analysis/spectrum/starting_basis.hpp>
 

@@ -1,6 +1,5 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/mode_tracker.hpp>
-#include <dashpot/analysis/tracker/tracked_modes.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>
 
 #include <algorithm>

@@ -3,7 +3,7 @@
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/enclosure.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
-#include <dashpot/analysis/tracker/tracked_modes.hpp>
+#include <dashpot/analysis/tracker/tracked_start.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
-#include <dashpot/analysis/tracker/tracked_modes.hpp>
+#include <dashpot/analysis/tracker/tracked_start.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
