@@ -1,6 +1,6 @@
 #include <dashpot/identification/check_model.hpp>
-#include <dashpot/identification/check_model/findings.hpp>
 #include <dashpot/identification/check_model/joint_order.hpp>
+#include <dashpot/identification/check_model/torque_fit.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <algorithm>
@@ -10,8 +10,6 @@
 
 namespace dashpot::identification {
 namespace {
-
-using Eigen::Index;
 
 constexpr Index kFewestWindows = 20;  // fewer leave no degrees of freedom for the deviations
 /// Two in the sum of logarithms is a seventh of the variance at one joint.

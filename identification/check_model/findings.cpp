@@ -1,5 +1,5 @@
-#include <dashpot/identification/check_model/findings.hpp>
-#include <dashpot/identification/check_model/hypotheses.hpp>
+#include <dashpot/identification/check_model/torque_fit.hpp>
+#include <dashpot/identification/check_model/weak_form.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <Eigen/Eigenvalues>
@@ -7,9 +7,6 @@
 
 namespace dashpot::identification {
 namespace {
-
-using Eigen::Index;
-using Eigen::VectorXd;
 
 constexpr double kKnownRotor = 0.04;  // deviation of a determined rotor, over it
 
@@ -209,6 +206,148 @@ void report(const TorqueFit& fit, ModelCheck& check) {
   if (check.order.empty()) report_suspicions(fit, check);
   report_ambiguities(fit, check);
   report_contacts(fit, check.contacts);
+}
+
+namespace {
+
+/// Compares the rotor with the model's.
+void doubt_rotor(const TorqueFit& fit, Index j, JointCheck& joint) {
+  const Index i = fit.rotor(j);
+  const double added = fit.result.value[i], deviation = joint.reflected_inertia.deviation;
+  const VectorXd without = fit.result.residual + fit.linear.A.col(i) * added;
+  const double old = fit.rms(without, fit.result, j);
+  constexpr double kSmall = 0.005, kShare = 0.8, kClear = 4;
+  if (!(std::abs(added) > kClear * deviation)) return;
+  if (old < kSmall * fit.largest[j] || joint.residual_after > kShare * old) return;
+  add_reason(joint.suspicious, "it looks as if its reflected inertia is " +
+                                   beside_model(added, deviation, fit.inertia_unit(j)) +
+                                   then_leaves(fit, j, joint.residual_after, old));
+}
+
+/// Compares the residual with the torque that varies with the motion.
+void doubt_rest(const TorqueFit& fit, Index j, JointCheck& joint) {
+  VectorXd varying = fit.torque.reshaped();
+  double mean = 0, count = 0;
+  for (Index row = j; row < varying.size(); row += fit.n) {
+    const double weight = fit.linear.used[row] * fit.result.weight[row];
+    mean += weight * varying[row];
+    count += weight;
+  }
+  varying.array() -= count > 0 ? mean / count : 0;
+  const double varies = fit.rms(varying, fit.result, j);
+  constexpr double kMuch = 0.25;
+  if (joint.residual_after > kMuch * varies && joint.suspicious.empty()) {
+    joint.suspicious = text::number(joint.residual_after, 2) + " of " + text::number(varies, 2) +
+                       fit.torque_unit(j) +
+                       " of its torque's variation remain unexplained by model, friction, offset "
+                       "and payload";
+  }
+}
+
+void doubt(const TorqueFit& fit, Index j, JointCheck& joint) {
+  // Friction that is large for the joint: a torque, and a torque for a velocity.
+  const double largest = fit.largest[j];
+  const double fastest = fit.linear.A.col(3 * j + 2).cwiseAbs().maxCoeff();
+  const auto doubt_friction = [&](const char* name, const Estimate& one, double scale) {
+    if (one.value < -4 * one.deviation && -one.value > 0.02 * scale) {
+      add_reason(joint.suspicious,
+                 std::string("its ") + name +
+                     " friction is negative: the torque does not belong to this motion, or lags "
+                     "behind it");
+    }
+  };
+  doubt_friction("Coulomb", joint.coulomb_friction, largest);
+  doubt_friction("viscous", joint.viscous_friction, fastest > 0 ? largest / fastest : 0);
+  doubt_rotor(fit, j, joint);
+  doubt_rest(fit, j, joint);
+}
+
+}  // namespace
+
+void report_suspicions(const TorqueFit& fit, ModelCheck& check) {
+  for (Index j = 0; j < fit.n; ++j) {
+    if (fit.moves[j]) doubt(fit, j, check.joints[static_cast<std::size_t>(j)]);
+  }
+  const Estimate& mass = check.payload.mass;
+  if (mass.value < -4 * mass.deviation && mass.value < -0.005 * fit.moved_mass()) {
+    add_reason(check.joints.back().suspicious,
+               "the payload that fits has a negative mass: the last links, or the payload of the "
+               "configuration, weigh less than the model says");
+  }
+}
+
+void add_reason(std::string& text, const std::string& reason) {
+  text += (text.empty() ? "" : "; ") + reason;
+}
+
+std::string beside_model(double value, double deviation, const std::string& unit) {
+  return text::number(std::abs(value), 2) + " +- " + text::number(deviation, 2) + unit +
+         (value > 0 ? " more" : " less") + " than the model says";
+}
+
+std::string then_leaves(const TorqueFit& fit, Index j, double now, double before) {
+  return ": joint " + std::to_string(j + 1) + " then leaves " + text::number(now, 2) +
+         " instead of " + text::number(before, 2) + fit.torque_unit(j) + " over";
+}
+
+namespace {
+
+std::string list(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
+  }
+  return text;
+}
+
+/// Whether parameter i is of a joint that rests.
+bool rests(const TorqueFit& fit, Index i) {
+  if (i < fit.payload()) return !fit.moves[i / 3];
+  return i >= fit.rotor(0) && i < fit.rest_of_delay() && !fit.moves[i - fit.rotor(0)];
+}
+
+void report_unseen(const TorqueFit& fit, ModelCheck& check) {
+  for (const auto direction : fit.result.unseen.colwise()) {
+    std::vector<std::string> names;
+    for (Index i = 0; i < direction.size(); ++i) {
+      if (!rests(fit, i) && std::abs(direction[i]) > 0.2) names.push_back(fit.parameter_name(i));
+    }
+    if (names.empty()) continue;
+    check.ambiguities.push_back(
+        (names.size() == 1 ? "the records say nothing of " : "the records cannot tell apart ") +
+        list(names));
+  }
+}
+
+void report_alike(const TorqueFit& fit, ModelCheck& check) {
+  const Eigen::MatrixXd& covariance = fit.result.covariance;
+  const auto nuisance = [&fit](Index i) {
+    return fit.linear.prior[i] == kHeld || (i >= fit.payload() + 4 && i < fit.rotor(0)) ||
+           fit.unseen(i);
+  };
+  for (Index i = 0; i <= fit.rest_of_delay(); ++i) {
+    for (Index k = i + 1; k <= fit.rest_of_delay(); ++k) {
+      if (nuisance(i) || nuisance(k)) continue;
+      const double correlation = covariance(i, k) / std::sqrt(covariance(i, i) * covariance(k, k));
+      if (std::abs(correlation) < 0.97) continue;
+      check.ambiguities.push_back("the records can hardly tell apart " + fit.parameter_name(i) +
+                                  " and " + fit.parameter_name(k) + " (correlation " +
+                                  text::fixed(correlation, 3) + ")");
+    }
+  }
+}
+
+}  // namespace
+
+void report_ambiguities(const TorqueFit& fit, ModelCheck& check) {
+  report_unseen(fit, check);
+  for (Index j = 0; j < fit.n; ++j) {
+    if (fit.moves[j]) continue;
+    check.ambiguities.push_back("joint " + std::to_string(j + 1) +
+                                " hardly moves: its friction is not known, and may be in its "
+                                "offset");
+  }
+  report_alike(fit, check);
 }
 
 }  // namespace dashpot::identification

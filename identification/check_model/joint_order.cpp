@@ -8,10 +8,6 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// Least fall of the sum of the logarithms of the residuals.
 constexpr double kFarBetter = 2;
 

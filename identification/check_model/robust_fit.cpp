@@ -9,10 +9,6 @@
 namespace dashpot::identification {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 constexpr double kUnseen = 1e-5;
 
 /// The solution by singular values, and the inverse of the normal matrix.

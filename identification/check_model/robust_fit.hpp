@@ -6,26 +6,29 @@
 
 namespace dashpot::identification {
 
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
 /// A linear model of torques: row k n + j belongs to joint j in window k.
 struct LinearModel {
-  Eigen::Index joints = 0;
-  Eigen::MatrixXd A;      ///< rows x parameters
-  Eigen::VectorXd y;      ///< rows
-  Eigen::VectorXd used;   ///< rows: 1, or 0 for a row that does not count
-  Eigen::VectorXd prior;  ///< parameters: standard deviation about zero; infinity: none
+  Index joints = 0;
+  MatrixXd A;      ///< rows x parameters
+  VectorXd y;      ///< rows
+  VectorXd used;   ///< rows: 1, or 0 for a row that does not count
+  VectorXd prior;  ///< parameters: standard deviation about zero; infinity: none
 };
 
 struct RobustFit {
-  Eigen::VectorXd value;
-  Eigen::MatrixXd covariance;
-  Eigen::VectorXd residual;  ///< rows, y - A value, of those that do not count as well
-  Eigen::VectorXd weight;    ///< rows, 0 to 1: less than 1 for outliers
-  Eigen::VectorXd sigma;     ///< joints, standard deviation of the residuals without outliers
+  VectorXd value;
+  MatrixXd covariance;
+  VectorXd residual;  ///< rows, y - A value, of those that do not count as well
+  VectorXd weight;    ///< rows, 0 to 1: less than 1 for outliers
+  VectorXd sigma;     ///< joints, standard deviation of the residuals without outliers
   /// Orthonormal directions, in units of each parameter's `scale`, that the rows hardly determine.
-  Eigen::MatrixXd unseen;
-  Eigen::VectorXd scale;  ///< of parameters: the inverse norm of their weighted columns
-  Eigen::VectorXd
-      inflation;         ///< joints, how many windows count as one, because residuals are alike
+  MatrixXd unseen;
+  VectorXd scale;        ///< of parameters: the inverse norm of their weighted columns
+  VectorXd inflation;    ///< joints, how many windows count as one, because residuals are alike
   double condition = 0;  ///< of the columns of norm 1, without unseen directions
 };
 

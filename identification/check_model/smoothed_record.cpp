@@ -1,4 +1,4 @@
-#include <dashpot/identification/check_model/smoothed_record.hpp>
+#include <dashpot/identification/check_model/weak_form.hpp>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -7,10 +7,6 @@
 
 namespace dashpot::identification {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 /// Samples of some channels at their times.
 struct Samples {

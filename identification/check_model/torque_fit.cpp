@@ -1,15 +1,10 @@
 #include <dashpot/controller/kdl_chain.hpp>
-#include <dashpot/identification/check_model/hypotheses.hpp>
 #include <dashpot/identification/check_model/torque_fit.hpp>
 
 #include <cmath>
 
 namespace dashpot::identification {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 /// Typical inertia of a body at the tip about the tip link's origin, kg m^2: ordinary motion hardly
 /// determines this inertia, which must not make the mass uncertain.

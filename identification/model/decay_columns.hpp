@@ -41,4 +41,9 @@ Eigen::Index product_width(const std::vector<MotionProduct>& products);
 /// Columns of the factors alone.
 Eigen::Index factor_width(const std::vector<DecayFactor>& factors);
 
+/// Gives factors without scales the scales that best fit the amplitudes that each record has by
+/// itself. `noise` has each channel's noise.
+void find_scales(const DecayData& data, const Eigen::VectorXd& noise,
+                 std::vector<DecayFactor>& factors);
+
 }  // namespace dashpot::identification

@@ -1,6 +1,5 @@
 #include <dashpot/identification/model/decay_columns.hpp>
 #include <dashpot/identification/model/decay_fit.hpp>
-#include <dashpot/identification/model/decay_scales.hpp>
 #include <dashpot/identification/model/variable_projection.hpp>
 #include <dashpot/identification/records/common.hpp>
 
@@ -9,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace dashpot::identification {

@@ -3,7 +3,6 @@
 #include <dashpot/identification/records/motion_spectrum.hpp>
 
 #include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>

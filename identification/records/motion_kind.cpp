@@ -1,9 +1,9 @@
 #include <dashpot/identification/motion_verdict.hpp>
+#include <dashpot/identification/records/ambient_correlations.hpp>
 #include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
 #include <dashpot/identification/records/motion_spectrum.hpp>
-#include <dashpot/identification/records/steady_lines.hpp>
 
 #include <Eigen/QR>
 #include <algorithm>

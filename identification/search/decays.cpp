@@ -1,7 +1,7 @@
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/model/decay_columns.hpp>
+#include <dashpot/identification/records/ambient_correlations.hpp>
 #include <dashpot/identification/records/common.hpp>
-#include <dashpot/identification/records/steady_lines.hpp>
 #include <dashpot/identification/search/measured_modes.hpp>
 #include <dashpot/identification/search/model_search.hpp>
 #include <dashpot/identification/search/moving_channels.hpp>

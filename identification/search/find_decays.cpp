@@ -1,8 +1,8 @@
 #include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/records/ambient_correlations.hpp>
 #include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
-#include <dashpot/identification/records/steady_lines.hpp>
 
 #include <algorithm>
 #include <array>

@@ -1,9 +1,6 @@
-#include <dashpot/identification/model/common_denominator.hpp>
 #include <dashpot/identification/model/decay_columns.hpp>
 #include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
-#include <dashpot/identification/search/model_changes.hpp>
-#include <dashpot/identification/search/model_parts.hpp>
 #include <dashpot/identification/search/model_search.hpp>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // Each rule by which a mode is not believed decides on either side of its limits, by itself.
-#include <dashpot/identification/search/doubts.hpp>
+#include <dashpot/identification/search/measured_modes.hpp>
 #include <dashpot/tests/identification/good_mode.hpp>
 #include <dashpot/tests/support/places.hpp>
 

@@ -1,6 +1,7 @@
 #include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/model/decay_columns.hpp>
+#include <dashpot/identification/model/decay_data.hpp>
 #include <dashpot/identification/model/decay_fit.hpp>
-#include <dashpot/identification/model/decay_scales.hpp>
 #include <dashpot/identification/search/model_search.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/refusal.hpp>
