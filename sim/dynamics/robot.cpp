@@ -10,9 +10,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <exception>
-#include <limits>
 #include <set>
 #include <sstream>
 #include <utility>
