@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/controller/dynamics.hpp>
 
 namespace dashpot::controller {
 
@@ -19,5 +20,16 @@ inline constexpr double kShareOfJointLimit = 0.4;
 /// Time in which that share of the tip's speed rises by 1, s. Next to a singularity it changes
 /// several times within a degree, and without this bound it would shake the arm at 9 Hz.
 inline constexpr double kShareRise = 1;
+
+/// The last good state, and the robot there.
+struct Sensed {
+  bool any = false;                           ///< there was one since the last reset
+  std::int64_t time = 0;                      ///< ns
+  double dt = 0;                              ///< since the one before, at least a period, s
+  JointVector q, qd;                          ///< n
+  Vector6 external_wrench = Vector6::Zero();  ///< the last finite one
+  DynamicsResult robot;
+  JointVector weight;  ///< the gravity torque that Dashpot compensates, n, N m
+};
 
 }  // namespace dashpot::controller

@@ -5,7 +5,6 @@
 #include <dashpot/controller/model/robot_model_data.hpp>
 
 #include <Eigen/Geometry>
-#include <array>
 #include <string>
 
 namespace dashpot::controller {

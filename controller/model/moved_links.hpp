@@ -2,10 +2,9 @@
 // The links that a chain moves: whether their inertias can be, and whether their units can be
 // right.
 
-#include <dashpot/controller/model/rigid_bodies.hpp>
+#include <dashpot/controller/model/robot_model_data.hpp>
 
 #include <kdl/chain.hpp>
-
 #include <string>
 #include <vector>
 

@@ -4,7 +4,6 @@
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
 #include <dashpot/controller/model/moved_links.hpp>
-#include <dashpot/controller/model/rigid_bodies.hpp>
 #include <dashpot/controller/model/robot_model_data.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
 

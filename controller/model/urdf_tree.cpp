@@ -1,7 +1,6 @@
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
 #include <dashpot/controller/robot_model.hpp>
-#include <dashpot/text/plain_urdf.hpp>
 #include <dashpot/text/read_file.hpp>
 #include <dashpot/text/xml_check.hpp>
 
@@ -10,7 +9,6 @@
 
 #include <algorithm>
 #include <exception>
-#include <map>
 #include <mutex>
 #include <numeric>
 #include <utility>

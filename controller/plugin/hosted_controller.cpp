@@ -1,7 +1,6 @@
 #include <dashpot/controller/plugin/hosted_controller.hpp>
 #include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/controller/posture_loop.hpp>
-#include <dashpot/controller/setpoint_check.hpp>
 
 #include <algorithm>
 

@@ -1,4 +1,3 @@
-#include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/safety/state_check.hpp>
 
 #include <algorithm>

@@ -1,4 +1,3 @@
-#include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/loop_system.hpp>
 
 #include <cmath>

@@ -1,3 +1,4 @@
+#include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 
@@ -154,6 +155,14 @@ std::string rotors_hint(const RobotModel& model, const std::string& inertia_opti
   }
   return hint + between + "Public figures of such an arm, with their doubts: " + drives_option +
          " " + std::string(unknown.published->name) + ".";
+}
+
+analysis::Gears elastic_joints(const RobotModel& model) {
+  const Eigen::VectorXd friction = model.joint_values(&Joint::viscous_friction);
+  return analysis::Gears({model.joint_values(&Joint::gear_stiffness),
+                          model.joint_values(&Joint::gear_damping),
+                          model.joint_values(&Joint::reflected_inertia), friction.asDiagonal(),
+                          model.position_sensor() == PositionSensor::kLink});
 }
 
 }  // namespace dashpot::controller

@@ -1,5 +1,5 @@
 // Which gains are judged again, and which are known to be good.
-#include <dashpot/controller/plugin/plugin_judgement.hpp>
+#include <dashpot/controller/plugin/hosted_controller.hpp>
 #include <dashpot/tests/support/chains.hpp>
 #include <dashpot/tests/support/constant_damping.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>
