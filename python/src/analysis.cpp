@@ -2,7 +2,7 @@
 
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/controller/posture_loop.hpp>
-#include <dashpot/python/src/analysis.hpp>
+#include <dashpot/python/src/shared.hpp>
 
 namespace dashpot::python {
 

@@ -4,13 +4,11 @@
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/contact_audit.hpp>
 #include <dashpot/controller/rotors.hpp>
-#include <dashpot/python/src/analysis.hpp>
-#include <dashpot/python/src/robot.hpp>
+#include <dashpot/python/src/shared.hpp>
 
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/pair.h>
 
-#include <functional>
 #include <type_traits>
 
 namespace dashpot::python {

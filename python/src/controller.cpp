@@ -5,7 +5,7 @@
 #include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
-#include <dashpot/python/src/controller_results.hpp>
+#include <dashpot/python/src/shared.hpp>
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 
 #include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/controller/posture_loop.hpp>
-#include <dashpot/python/src/controller_results.hpp>
+#include <dashpot/python/src/shared.hpp>
 
 #include <array>
 #include <complex>

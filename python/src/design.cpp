@@ -1,7 +1,7 @@
 // Damping for wanted ratios.
 
 #include <dashpot/analysis/damping_sampled.hpp>
-#include <dashpot/python/src/analysis.hpp>
+#include <dashpot/python/src/shared.hpp>
 
 namespace dashpot::python {
 

@@ -3,14 +3,12 @@
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
-#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/settings_check.hpp>
-#include <dashpot/python/src/analysis.hpp>
-#include <dashpot/python/src/robot.hpp>
+#include <dashpot/python/src/shared.hpp>
 
 #include <array>
 #include <cmath>
