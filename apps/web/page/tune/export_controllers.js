@@ -1,9 +1,8 @@
 // The task's gains as texts for other controllers, which have diagonals. `of` is {setup, q, design, answer}, as for
 // Dashpot.
 import {rounded} from '../shared/numbers.js';
-import {kTaskAxes} from './designs.js';
+import {diagonal, isDiagonal, kTaskAxes} from './designs.js';
 import {nullDamping, notes} from './export_dashpot.js';
-import {diagonal, isDiagonal} from './matrices.js';
 
 const round = (x) => rounded(x, 7);
 const decimal = (x) => (Number.isInteger(x) ? `${x}.0` : String(x));

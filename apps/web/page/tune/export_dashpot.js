@@ -1,6 +1,6 @@
 // A design as a text for Dashpot. `of` is {setup, q, design, answer}: the request and the program's answer.
 import {rounded} from '../shared/numbers.js';
-import {compact, diagonal, isDiagonal} from './matrices.js';
+import {compact, diagonal, isDiagonal} from './designs.js';
 
 const kDiffers = 'the modes differ from those on the page.';
 const json = JSON.stringify;

@@ -1,8 +1,7 @@
 // The fields of stiffness and damping, at the tip, in the joints and in the null space.
 import {rounded} from '../shared/numbers.js';
 import {at} from './form_fields.js';
-import {asRows, diagonal, kindOf} from './matrices.js';
-import {kTaskAxes} from './designs.js';
+import {asRows, diagonal, kindOf, kTaskAxes} from './designs.js';
 
 // Units and ends of the sliders.
 const linear = (most, mostDamping) =>
