@@ -1,12 +1,10 @@
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/apps/audit/audit_options.hpp>
-#include <dashpot/apps/audit/presets.hpp>
-#include <dashpot/apps/cli/drives_option.hpp>
-#include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/report/text_table.hpp>
-#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/apps/scene/scene.hpp>
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/yaml_document.hpp>
@@ -20,7 +18,6 @@ namespace dashpot::apps {
 namespace {
 
 using controller::AuditOptions;
-using controller::JointVector;
 using controller::Mode;
 using controller::RobotModel;
 using text::Units;

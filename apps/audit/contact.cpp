@@ -1,7 +1,5 @@
 // dashpot contact: the command line, and the work.
-#include <dashpot/apps/audit/contact_report.hpp>
-#include <dashpot/apps/audit/posture_workers.hpp>
-#include <dashpot/apps/cli/gnuplot.hpp>
+#include <dashpot/apps/audit/audit_report.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>

@@ -1,5 +1,5 @@
-#include <dashpot/apps/audit/contact_report.hpp>
-#include <dashpot/apps/cli/gnuplot.hpp>
+#include <dashpot/apps/audit/audit_report.hpp>
+#include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/apps/report/text_table.hpp>

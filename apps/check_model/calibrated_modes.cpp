@@ -13,14 +13,11 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::Config;
-using controller::JointVector;
 using controller::RobotDescription;
 using controller::RobotModel;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using identification::ModelCheck;
 
 constexpr double kMostDelay = controller::Analysis::Sampled::kMostDelay;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();

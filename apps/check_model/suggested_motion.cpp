@@ -1,11 +1,10 @@
 #include <dashpot/apps/check_model/calibrated_modes.hpp>
-#include <dashpot/apps/check_model/config_change.hpp>
 #include <dashpot/apps/check_model/suggested_motion.hpp>
 #include <dashpot/apps/check_model/written_arm.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/loop/simulated_loop.hpp>
-#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/apps/scene/scene.hpp>
 #include <dashpot/text/printable.hpp>
 #include <dashpot/text/read_file.hpp>
 
@@ -19,11 +18,7 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::Config;
-using controller::JointVector;
 using Eigen::Index;
-using identification::JointCheck;
-using identification::ModelCheck;
 using identification::TorqueRecord;
 
 /// How fast goals are gone to: the share of the velocity limits, s to reach it, s in all.

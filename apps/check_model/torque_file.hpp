@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/records/recorded_motion.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/identification/check_model.hpp>
 

@@ -15,7 +15,6 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::InputError;
 using text::Units;
 
 std::vector<std::string> split(const std::string& text) {

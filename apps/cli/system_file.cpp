@@ -1,15 +1,12 @@
 #include <dashpot/analysis/null_damping.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/text/setting_reader.hpp>
-#include <dashpot/text/yaml_document.hpp>
 
 #include <Eigen/Cholesky>
 #include <array>
 #include <limits>
 #include <stdexcept>
-#include <string>
 #include <utility>
-#include <vector>
 
 namespace dashpot::apps {
 namespace {

@@ -3,10 +3,7 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
-#include <dashpot/apps/design/design_contact.hpp>
-#include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/apps/design/design_report.hpp>
-#include <dashpot/apps/design/region_report.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/rotors.hpp>

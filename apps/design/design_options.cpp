@@ -1,6 +1,5 @@
-#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
-#include <dashpot/apps/design/design_options.hpp>
+#include <dashpot/apps/design/design_report.hpp>
 
 #include <CLI/CLI.hpp>
 #include <limits>

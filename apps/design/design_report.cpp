@@ -1,6 +1,4 @@
-#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/design/design_report.hpp>
-#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/posture_loop.hpp>

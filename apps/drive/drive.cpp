@@ -1,12 +1,12 @@
-#include <dashpot/apps/cli/drives_option.hpp>
+#include <dashpot/apps/cli/arm_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
-#include <dashpot/apps/drive/drive_report.hpp>
+#include <dashpot/apps/drive/drive_session.hpp>
 #include <dashpot/apps/identify/identify.hpp>
-#include <dashpot/apps/loop/privileges.hpp>
-#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/apps/loop/loop_thread.hpp>
+#include <dashpot/apps/scene/scene.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/lcmtypes/sink.hpp>

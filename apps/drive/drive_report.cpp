@@ -1,12 +1,11 @@
-#include <dashpot/apps/drive/drive_report.hpp>
+#include <dashpot/apps/drive/drive_session.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/controller/tick_status.hpp>
 #include <dashpot/text/printable.hpp>
 
-#include <nlohmann/json.hpp>
-
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 namespace dashpot::apps {

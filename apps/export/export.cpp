@@ -1,22 +1,204 @@
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
-#include <dashpot/apps/export/mcap_writer.hpp>
-#include <dashpot/apps/report/message_json.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 namespace dashpot::apps {
 namespace {
+
+constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
+constexpr std::size_t kChunkSize = 1 << 20;  // bytes
+
+enum Op : char {
+  kHeader = 0x01,
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07,
+  kChunkIndex = 0x08,
+  kStatistics = 0x0B,
+  kDataEnd = 0x0F,
+};
+
+/// The fields of a record, little-endian.
+class Fields {
+ public:
+  template <std::unsigned_integral T>
+  Fields& number(T value) {
+    for (std::size_t i = 0; i < sizeof(T); ++i) {
+      bytes_ += static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i) & 0xFF);
+    }
+    return *this;
+  }
+  Fields& text(std::string_view value) {
+    return number(static_cast<std::uint32_t>(value.size())).raw(value);
+  }
+  Fields& raw(std::string_view value) {
+    bytes_ += value;
+    return *this;
+  }
+  Fields& map(const std::map<std::uint16_t, std::uint64_t>& values) {
+    number(static_cast<std::uint32_t>(10 * values.size()));
+    for (const auto& [key, value] : values) number(key).number(value);
+    return *this;
+  }
+  std::string record(Op op) const {
+    Fields head;
+    head.number(std::uint64_t{bytes_.size()});
+    return std::string(1, op) + head.bytes_ + bytes_;
+  }
+
+ private:
+  std::string bytes_;
+};
+
+/// Writes an MCAP file of JSON messages (https://mcap.dev/spec): chunks without compression, an
+/// index of each, and a summary, so that readers can seek.
+class McapWriter {
+ public:
+  /// `file` must outlive the writer. All functions throw std::runtime_error if writing fails.
+  explicit McapWriter(OutputFile& file) : file_(file) {
+    write(kMagic);
+    write(Fields().text("").text("dashpot").record(kHeader));
+  }
+
+  /// Adds a channel with the JSON schema of its messages; returns its number.
+  std::uint16_t add_channel(const std::string& topic, const std::string& schema_name,
+                            const std::string& schema) {
+    const auto id = static_cast<std::uint16_t>(counts_.size() + 1);
+    const std::string records =
+        Fields().number(id).text(schema_name).text("jsonschema").text(schema).record(kSchema) +
+        Fields().number(id).number(id).text(topic).text("json").number(0U).record(kChannel);
+    summary_ += records;
+    chunk_ += records;
+    counts_[id] = 0;
+    return id;
+  }
+  /// Adds a message; `time` is in ns since 1970-01-01 UTC.
+  void add_message(std::uint16_t channel, std::uint64_t time, std::string_view json) {
+    const std::uint64_t number = ++counts_[channel];
+    const bool first = index_.empty();
+    open_.start = first ? time : std::min(open_.start, time);
+    open_.end = first ? time : std::max(open_.end, time);
+    index_[channel].push_back({time, chunk_.size()});
+    chunk_ += Fields()
+                  .number(channel)
+                  .number(static_cast<std::uint32_t>(number))
+                  .number(time)
+                  .number(time)
+                  .raw(json)
+                  .record(kMessage);
+    if (chunk_.size() >= kChunkSize) end_chunk();
+  }
+  /// Writes the summary. Nothing may be added afterwards.
+  void finish() {
+    end_chunk();
+    write(Fields().number(0U).record(kDataEnd));
+    const std::uint64_t start = at_;
+    write(summary_);
+    std::uint64_t messages = 0;
+    for (const auto& [channel, count] : counts_) messages += count;
+    const auto channels = static_cast<std::uint32_t>(counts_.size());
+    write(Fields()
+              .number(messages)
+              .number(static_cast<std::uint16_t>(channels))
+              .number(channels)
+              .number(0U)
+              .number(0U)
+              .number(static_cast<std::uint32_t>(chunks_.size()))
+              .number(start_)
+              .number(end_)
+              .map(counts_)
+              .record(kStatistics));
+    for (const Chunk& chunk : chunks_) {
+      write(Fields()
+                .number(chunk.start)
+                .number(chunk.end)
+                .number(chunk.offset)
+                .number(chunk.size)
+                .map(chunk.indexes)
+                .number(chunk.index_size)
+                .text("")
+                .number(chunk.data_size)
+                .number(chunk.data_size)
+                .record(kChunkIndex));
+    }
+    write(Fields().number(start).number(std::uint64_t{0}).number(0U).record(kFooter));
+    write(kMagic);
+  }
+
+ private:
+  struct Chunk {
+    std::uint64_t start = 0, end = 0;    ///< times, ns
+    std::uint64_t offset = 0, size = 0;  ///< of the record in the file, bytes
+    std::uint64_t index_size = 0, data_size = 0;
+    std::map<std::uint16_t, std::uint64_t> indexes;  ///< offset of each channel's index
+  };
+  using Index = std::map<std::uint16_t, std::vector<std::array<std::uint64_t, 2>>>;
+
+  void write(std::string_view bytes) {
+    file_.write(bytes);
+    at_ += bytes.size();
+  }
+  void end_chunk() {
+    if (index_.empty()) return;
+    start_ = chunks_.empty() ? open_.start : std::min(start_, open_.start);
+    end_ = std::max(end_, open_.end);
+    open_.offset = at_;
+    open_.data_size = chunk_.size();
+    write(Fields()
+              .number(open_.start)
+              .number(open_.end)
+              .number(open_.data_size)
+              .number(0U)  // no checksum
+              .text("")    // no compression
+              .number(open_.data_size)
+              .raw(chunk_)
+              .record(kChunk));
+    open_.size = at_ - open_.offset;
+    for (auto& [channel, entries] : index_) {
+      std::sort(entries.begin(), entries.end());
+      Fields fields;
+      fields.number(channel).number(static_cast<std::uint32_t>(16 * entries.size()));
+      for (const auto& entry : entries) fields.number(entry[0]).number(entry[1]);
+      open_.indexes[channel] = at_;
+      write(fields.record(kMessageIndex));
+    }
+    open_.index_size = at_ - open_.offset - open_.size;
+    chunks_.push_back(open_);
+    open_ = {};
+    index_.clear();
+    chunk_.clear();
+  }
+
+  OutputFile& file_;
+  std::uint64_t at_ = 0;  ///< bytes written
+  std::string summary_;   ///< schemas and channels, as records
+  std::string chunk_;     ///< records of the open chunk
+  Chunk open_;
+  Index index_;  ///< time and offset of the messages in the open chunk
+  std::vector<Chunk> chunks_;
+  std::map<std::uint16_t, std::uint64_t> counts_;
+  std::uint64_t start_ = 0, end_ = 0;
+};
 
 struct ExportOptions {
   std::string log, mcap, csv;

@@ -1,5 +1,4 @@
-#include <dashpot/apps/identify/calibration.hpp>
-#include <dashpot/apps/identify/mode_match.hpp>
+#include <dashpot/apps/identify/loop_prediction.hpp>
 #include <dashpot/controller/input_error.hpp>
 
 #include <Eigen/Cholesky>
@@ -12,13 +11,7 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::InputError;
 using controller::Joint;
-using controller::JointVector;
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-using identification::MeasuredMode;
 
 /// Largest root mean square of differences, in deviations, with which a model fits: noise alone
 /// gives 1, and an arm is not quite linear.

@@ -1,7 +1,5 @@
-#include <dashpot/apps/identify/calibration.hpp>
 #include <dashpot/apps/identify/identify.hpp>
-#include <dashpot/apps/identify/mode_match.hpp>
-#include <dashpot/apps/identify/recorded_parts.hpp>
+#include <dashpot/apps/identify/loop_prediction.hpp>
 #include <dashpot/controller/input_error.hpp>
 
 #include <algorithm>
@@ -11,11 +9,6 @@
 
 namespace dashpot::apps {
 namespace {
-
-using controller::InputError;
-using Eigen::Index;
-using identification::MotionKind;
-using identification::MotionRecord;
 
 /// Rest positions that are closer belong to one posture, rad or m.
 constexpr double kSamePosture = 0.02;

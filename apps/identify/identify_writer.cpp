@@ -1,4 +1,4 @@
-#include <dashpot/apps/identify/identify_writer.hpp>
+#include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 
@@ -12,8 +12,6 @@ namespace dashpot::apps {
 namespace {
 
 using Align = TextTable::Align;
-using identification::MeasuredMode;
-using identification::MotionKind;
 
 std::string count(std::size_t n, const std::string& what) {
   return (n == 0 ? "no" : std::to_string(n)) + " " + what + (n == 1 ? "" : "s");

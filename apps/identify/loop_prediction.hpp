@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/identify/identify_writer.hpp>
+#include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/controller/config.hpp>
 
 #include <string>
@@ -35,5 +35,22 @@ class LoopPrediction {
   controller::Config config_;
   std::vector<Eigen::Index> joint_;  ///< of each channel
 };
+
+/// Matches each prediction with a measured mode: the nearest in frequency, ratio and shape
+/// (nearest_pairs).
+void match(const std::vector<identification::MeasuredMode>& measured,
+           std::vector<PredictedMode>& predicted);
+
+/// Puts modes into the order of equally many others with similar shapes, because the order by
+/// frequency changes with an arm's parameters. Does nothing if the numbers differ.
+void put_in_order(const std::vector<PredictedMode>& others, std::vector<PredictedMode>& modes);
+
+/// Finds the change of the parameters `names` ("payload,reflected_inertia,friction,delay") that
+/// explains the differences best: least squares of the measured numbers at all postures, each in
+/// units of its deviation, with Huber's weights and within bounds (mass, inertia, friction and
+/// delay are not negative, and a body can have the payload's inertia). Updates the predictions.
+/// Throws InputError for other names.
+Calibration calibrate(const LoopPrediction& loop, const std::string& names,
+                      std::vector<PostureReport>& postures);
 
 }  // namespace dashpot::apps

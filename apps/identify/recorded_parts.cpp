@@ -1,4 +1,4 @@
-#include <dashpot/apps/identify/recorded_parts.hpp>
+#include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/input_error.hpp>
@@ -12,11 +12,6 @@
 
 namespace dashpot::apps {
 namespace {
-
-using controller::InputError;
-using Eigen::Index;
-using identification::MotionKind;
-using identification::MotionRecord;
 
 /// Motion over more than this is large, rad: the inertia that a joint sees changes by about as
 /// large a share with the posture. The scale of a linear motion is free; the fit judges it.

@@ -1,5 +1,4 @@
 #include <dashpot/apps/cli/arm_option.hpp>
-#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>

@@ -1,11 +1,96 @@
 #include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/apps/loop/loop_journal.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/controller/attachment.hpp>
+#include <dashpot/controller/input_error.hpp>
+#include <dashpot/controller/tick_status.hpp>
+#include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/lcmtypes/plugin_samples.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
 
 namespace dashpot::apps {
+
+using lcmtypes::Command;
+using lcmtypes::CommandVerdict;
+
+namespace {
+
+/// Carries out the receiver's part of a valid command; false if the controller refuses it.
+bool carry_out(Command& command, LoopGoal& goal, std::string& reason) {
+  const std::int64_t before = command.accepted - 1;
+  const auto change = [&command, before](controller::Gains& gains) {
+    controller::Setpoint changed;
+    changed.gains = gains;
+    lcmtypes::apply(command, changed, before);
+    gains = changed.gains;
+  };
+  LoopGoal::Change wanted{change, {}, {}, {}};
+  if (lcmtypes::has_set(command, command_t::PAYLOAD, before)) wanted.payload = command.payload;
+  if (lcmtypes::has_set(command, command_t::TOOL_FRAME, before)) wanted.tool = command.tool;
+  if (lcmtypes::has_set(command, command_t::TIP_SPEED, before)) {
+    wanted.tip_speed = command.tip_speed;
+  }
+  if (goal.change(wanted, reason) != DASHPOT_OK) return false;
+  if (lcmtypes::has_set(command, command_t::TIP_POSE, before)) {
+    command.pose_tool = goal.latest_tool();
+  }
+  if (lcmtypes::has_set(command, command_t::RELEASE, before)) goal.release();
+  return true;
+}
+
+}  // namespace
+
+void refuse_second_loop(const std::shared_ptr<lcm::LCM>& bus) {
+  constexpr std::chrono::milliseconds kListened{300};  // states come every period
+  bool heard = false;
+  lcmtypes::MessageHandlers handlers;
+  handlers.on_state = [&heard](const state_t& /*message*/) { heard = true; };
+  lcmtypes::BusReader reader(bus, handlers);
+  const auto end = std::chrono::steady_clock::now() + kListened;
+  while (!heard && std::chrono::steady_clock::now() < end) reader.wait(20);
+  if (!heard) return;
+  throw controller::InputError(
+      "--commands",
+      "another loop publishes states on this bus, and both would take each "
+      "command: end it, or give this one a bus of its own (--lcm-url)");
+}
+
+CommandSource::CommandSource(std::shared_ptr<lcm::LCM> bus, const lcmtypes::CommandLimits& limits,
+                             LoopGoal& goal)
+    : goal_(goal),
+      receiver_(std::move(bus), limits, [&goal](Command& command, std::string& reason) {
+        return carry_out(command, goal, reason);
+      }) {}
+
+bool CommandSource::take() noexcept {
+  constexpr std::int32_t kGoals = int{command_t::MODE} + int{command_t::JOINT_POSITION} +
+                                  int{command_t::TIP_POSE} + int{command_t::WRENCH};
+  taken_ = false;
+  if (!receiver_.fetch()) return false;
+  const Command& command = receiver_.command();
+  // Only new parts: the scenario may have replaced older ones meanwhile.
+  const std::int64_t before = std::exchange(commands_, command.accepted);
+  for (std::int32_t part = 1; part <= kGoals; part *= 2) {
+    taken_ = taken_ || ((kGoals & part) != 0 && lcmtypes::has_set(command, part, before));
+  }
+  if (taken_) {
+    controller::Setpoint setpoint = goal_.setpoint();
+    lcmtypes::apply(command, setpoint, before);
+    if (lcmtypes::has_set(command, command_t::TIP_POSE, before)) {
+      setpoint.tip_pose = controller::carried(setpoint.tip_pose, command.pose_tool, goal_.tool());
+    }
+    goal_.hold(setpoint);
+  }
+  return lcmtypes::has_set(command, command_t::RELEASE, before);
+}
+
 namespace {
 
 constexpr std::int64_t kMostTimes = 1 << 24;  // tick times that are kept
@@ -115,6 +200,83 @@ void LoopJournal::note_errors(const dashpot_snapshot& snapshot) noexcept {
     const double error = std::abs(snapshot.reference_joint_position[i] - snapshot.position[i]);
     record.joint_error = std::max(record.joint_error, error);
   }
+}
+
+namespace {
+
+std::string latched_text(std::int32_t fault) {
+  return controller::to_text(static_cast<controller::Status>(fault));
+}
+
+}  // namespace
+
+std::string verdicts_text(std::span<const std::int64_t> verdicts) {
+  const std::int64_t accepted = verdicts.empty() ? 0 : verdicts.front();
+  const std::int64_t all = std::accumulate(verdicts.begin(), verdicts.end(), std::int64_t{0});
+  std::string out =
+      std::to_string(accepted) + " accepted, " + std::to_string(all - accepted) + " rejected";
+  std::string reasons;
+  for (std::size_t i = 1; i < verdicts.size(); ++i) {
+    if (verdicts[i] == 0) continue;
+    reasons += (reasons.empty() ? "" : ", ") + std::to_string(verdicts[i]) + " " +
+               lcmtypes::to_text(static_cast<CommandVerdict>(i));
+  }
+  return reasons.empty() ? out : out + " (" + reasons + ")";
+}
+
+std::string commands_text(const std::optional<CommandReport>& report, std::int64_t refused) {
+  if (!report) return "  Commands: not taken (--commands)\n";
+  const lcmtypes::CommandTally& tally = report->tally;
+  std::string out = "  Commands: " + verdicts_text(tally.verdicts);
+  if (refused > 0) {
+    out += ", " + std::to_string(refused) + " of those accepted refused by the controller";
+  }
+  if (tally.last_refusal != CommandVerdict::kAccepted) {
+    out += "; last rejected: " + report->last_reason + ", of sender " +
+           std::to_string(tally.last_refused_sender);
+  }
+  return out + "\n";
+}
+
+std::string fault_text(const LoopRecord& loop) {
+  if (loop.faults == 0) return "";
+  std::string out = "  Faults latched: " + std::to_string(loop.faults);
+  if (loop.fault != DASHPOT_OK) {
+    out += "; not released: " + latched_text(loop.fault) + ", at tick " +
+           std::to_string(loop.fault_tick);
+  }
+  return out + "\n";
+}
+
+void refuse_latched_fault(const LoopRecord& loop) {
+  if (loop.fault == DASHPOT_OK) return;
+  throw std::runtime_error("ended in a fault: " + latched_text(loop.fault) + ", at tick " +
+                           std::to_string(loop.fault_tick) + " (docs/safety.md)");
+}
+
+Json commands_json(const std::optional<CommandReport>& report, std::int64_t refused) {
+  const CommandReport commands = report.value_or(CommandReport());
+  const lcmtypes::CommandTally& tally = commands.tally;
+  Json verdicts = Json::object(), last_refusal;
+  for (std::size_t i = 0; i < tally.verdicts.size(); ++i) {
+    if (tally.verdicts[i] == 0) continue;
+    verdicts[lcmtypes::to_text(static_cast<CommandVerdict>(i))] = tally.verdicts[i];
+  }
+  if (tally.last_refusal != CommandVerdict::kAccepted) {
+    last_refusal = {{"verdict", lcmtypes::to_text(tally.last_refusal)},
+                    {"reason", commands.last_reason},
+                    {"sender", tally.last_refused_sender},
+                    {"utime", tally.last_refusal_utime}};
+  }
+  return {{"taken", report.has_value()},  {"accepted", tally.accepted()},
+          {"rejected", tally.rejected()}, {"refused", refused},
+          {"verdicts", verdicts},         {"last_refusal", last_refusal},
+          {"commander", tally.commander}};
+}
+
+Json fault_json(const LoopRecord& loop) {
+  if (loop.fault == DASHPOT_OK) return nullptr;
+  return {{"status", latched_text(loop.fault)}, {"tick", loop.fault_tick}};
 }
 
 }  // namespace dashpot::apps

@@ -1,14 +1,53 @@
 #pragma once
-#include <dashpot/apps/loop/command_source.hpp>
+#include <dashpot/apps/loop/loop_goal.hpp>
+#include <dashpot/lcmtypes/command_receiver.hpp>
+#include <dashpot/lcmtypes/command_verdict.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/sim/step_status.hpp>
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 namespace dashpot::apps {
+
+/// Listens for a moment, and throws InputError if another loop publishes its states on the bus:
+/// both would take each command.
+void refuse_second_loop(const std::shared_ptr<lcm::LCM>& bus);
+
+/// Takes commands for a loop from a bus. Gains, payload, tool, speeds and releases go to the
+/// controller on the receiver's thread, because judging them may take milliseconds; if it refuses
+/// one, the whole command is refused. The rest goes to the loop's thread.
+class CommandSource {
+ public:
+  /// `goal` must outlive it. Otherwise as CommandReceiver.
+  CommandSource(std::shared_ptr<lcm::LCM> bus, const lcmtypes::CommandLimits& limits,
+                LoopGoal& goal);
+
+  // The loop's thread; none of these ever waits.
+  /// Before a tick: sets the loop's goal. True if a fault is released with this tick.
+  bool take() noexcept;
+  /// Whether this tick's set-point was commanded.
+  bool taken() const noexcept { return taken_; }
+  const lcmtypes::CommandTally& fetch_tally() noexcept { return receiver_.fetch_tally(); }
+  /// The fault that commands may release from now on, by the tick at which it latched; 0: none.
+  void set_fault_tick(std::int64_t tick) noexcept { receiver_.set_fault_tick(tick); }
+
+  // Other threads.
+  lcmtypes::CommandTally tally() const { return receiver_.tally(); }
+  std::string last_reason() const { return receiver_.last_reason(); }
+
+ private:
+  LoopGoal& goal_;
+  std::int64_t commands_ = 0;  ///< accepted ones passed on to the loop
+  bool taken_ = false;
+  lcmtypes::CommandReceiver receiver_;
+};
 
 /// Counts and extremes of a loop while it ran.
 struct LoopRecord {
@@ -84,5 +123,26 @@ class LoopJournal {
   lcmtypes::ModesSample modes_;
   lcmtypes::SampledModesSample sampled_;
 };
+
+/// The results of the commands of a run.
+struct CommandReport {
+  lcmtypes::CommandTally tally;
+  std::string last_reason;  ///< of the last rejection
+};
+
+/// "3 accepted, 2 rejected (1 too old, 1 not finite)", of state_t::verdicts.
+std::string verdicts_text(std::span<const std::int64_t> verdicts);
+
+/// For people: lines that begin with two spaces. `report` without a value: commands were disabled;
+/// `refused`: accepted commands that the controller refused.
+std::string commands_text(const std::optional<CommandReport>& report, std::int64_t refused);
+std::string fault_text(const LoopRecord& loop);
+
+nlohmann::ordered_json commands_json(const std::optional<CommandReport>& report,
+                                     std::int64_t refused);
+/// Throws std::runtime_error if a fault is latched at the end, so that the exit status shows it.
+void refuse_latched_fault(const LoopRecord& loop);
+/// null if no fault is latched at the end
+nlohmann::ordered_json fault_json(const LoopRecord& loop);
 
 }  // namespace dashpot::apps

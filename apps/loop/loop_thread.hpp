@@ -1,6 +1,5 @@
 #pragma once
 #include <dashpot/apps/loop/loop_journal.hpp>
-#include <dashpot/apps/loop/privileges.hpp>
 #include <dashpot/apps/loop/simulated_loop.hpp>
 
 #include <atomic>
@@ -9,6 +8,17 @@
 #include <thread>
 
 namespace dashpot::apps {
+
+/// What the operating system granted to a loop in real time.
+struct Privileges {
+  bool scheduled = false;  ///< SCHED_FIFO
+  bool locked = false;     ///< all memory stays resident
+};
+
+/// Locks all memory, now and to come, unless the limit on it could stop the program later.
+bool lock_memory() noexcept;
+/// Schedules the calling thread ahead of others.
+bool schedule_ahead_of_others() noexcept;
 
 using Pace = LoopJournal::Pace;
 

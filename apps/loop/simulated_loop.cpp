@@ -1,5 +1,4 @@
 #include <dashpot/apps/loop/simulated_loop.hpp>
-#include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/tick_status.hpp>
 

@@ -1,5 +1,5 @@
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/apps/loop/command_report.hpp>
+#include <dashpot/apps/loop/loop_journal.hpp>
 #include <dashpot/apps/monitor/monitor_view.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/controller/posture_loop.hpp>

@@ -1,5 +1,5 @@
 #include <dashpot/apps/records/csv_column.hpp>
-#include <dashpot/apps/records/motion_rows.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
 
 #include <algorithm>
 #include <charconv>

@@ -1,6 +1,5 @@
 #include <dashpot/apps/records/csv_column.hpp>
 #include <dashpot/apps/records/motion_file.hpp>
-#include <dashpot/apps/records/motion_rows.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/text/read_file.hpp>
 
@@ -9,7 +8,6 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <string_view>
 
 namespace dashpot::apps {
 namespace {

@@ -1,9 +1,42 @@
 #pragma once
-#include <dashpot/apps/records/recorded_motion.hpp>
+#include <dashpot/controller/input_error.hpp>
 
+#include <Eigen/Core>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace dashpot::apps {
+
+/// One channel of a recorded motion.
+struct MotionChannel {
+  std::string name;
+  std::string unit;  ///< SI: rad, m, rad/s, m/s, N m, N; or the file's own; empty if it has none
+  std::string problem = {};  ///< why it cannot be used; empty if it can
+};
+
+/// Properties that a file lacks.
+struct FileHints {
+  double rate = 0;      ///< samples in a second, of files without a time; 0: they have one
+  std::string columns;  ///< "time [s],q1 [rad]": the names of files without a line of them
+};
+
+/// A recorded motion.
+struct MotionFile {
+  std::vector<MotionChannel> channels;
+  Eigen::VectorXd time;    ///< s, strictly rising, from the first sample
+  Eigen::MatrixXd values;  ///< channels x samples, SI; NaN where a sample is missing
+  /// For each sample whether the status was ok and reference and wrench were constant; empty for
+  /// CSV files.
+  std::vector<bool> free;
+  std::vector<bool> rests;  ///< the same, whatever the wrench does
+  /// True for a log whose springs are at the joints throughout: the tip's wrench then comes from an
+  /// excitation alone, and is in channels wrench_x ... wrench_rz.
+  bool wrench = false;
+  std::vector<std::string> notes;  ///< what was guessed or left out
+  int duplicates = 0;              ///< samples left out because another has the same time
+  int out_of_order = 0;  ///< samples left out because their time is before the previous one
+};
 
 /// Reads an LCM log with DASHPOT_STATE messages (channels q1 ..., v1 ..., tau1 ... and wrench_x
 /// ...), or a CSV file: a line of names with units ("q1 [rad]", "q1 (deg)", "q1_deg"; without a
@@ -30,5 +63,48 @@ std::vector<Eigen::Index> chosen_channels(const std::vector<MotionChannel>& chan
 std::vector<std::string> left_out_positions(const std::vector<MotionChannel>& channels,
                                             const std::vector<Eigen::Index>& chosen,
                                             const std::vector<Eigen::Index>& others);
+
+/// Rows of samples, in the order of time.
+class Rows {
+ public:
+  static constexpr std::size_t kLeast = 20;
+
+  explicit Rows(MotionFile& file) : file_(file) {}
+
+  /// The sample at `time` (s): `count` values.
+  bool add(double time, const double* values, std::size_t count) {
+    if (!times_.empty() && time <= times_.back()) {
+      ++(time == times_.back() ? file_.duplicates : file_.out_of_order);
+      return false;
+    }
+    times_.push_back(time);
+    values_.insert(values_.end(), values, values + count);
+    return true;
+  }
+
+  std::size_t size() const { return times_.size(); }
+
+  void finish() {
+    if (times_.size() < kLeast) {
+      const std::string same = file_.duplicates == 0
+                                   ? ""
+                                   : "; " + std::to_string(file_.duplicates) +
+                                         " more have the time of another: it needs more digits";
+      throw controller::InputError(
+          "", std::to_string(times_.size()) + " samples, need 20 or more" + same);
+    }
+    const auto N = static_cast<Eigen::Index>(times_.size());
+    file_.time = Eigen::Map<const Eigen::VectorXd>(times_.data(), N).array() - times_.front();
+    file_.values = Eigen::Map<const Eigen::MatrixXd>(
+        values_.data(), static_cast<Eigen::Index>(file_.channels.size()), N);
+  }
+
+ private:
+  MotionFile& file_;
+  std::vector<double> times_, values_;
+};
+
+/// See read_motion_file; `text` is all of a CSV file.
+MotionFile read_csv(std::string_view text, const FileHints& hints = {});
 
 }  // namespace dashpot::apps

@@ -1,6 +1,8 @@
 #pragma once
 #include <dashpot/controller/plugin.h>
-#include <dashpot/apps/report/fields.hpp>
+#include <dashpot/analysis/response.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 
 #include <Eigen/Core>
@@ -42,5 +44,18 @@ std::string integral_text(const std::vector<double>& decays);
 /// Returns a line with the assumptions of a loop, see controller::loop_assumptions; "" if there are
 /// none.
 std::string assumes_text(const std::vector<std::string>& names);
+
+/// Returns a table of the modes with their shares in a motion and the amplitudes of `point`, and of
+/// the other shares.
+std::string shares_table(const analysis::Spectrum<>& spectrum, const analysis::ModeShares& shares,
+                         const std::string& point);
+
+/// Returns energy, zero_modes, cross, and amplitude: a list for each mode.
+Json shares_json(const analysis::ModeShares& shares);
+
+/// Pairs rows with columns of `distances` so that the sum of squares is least; an unpaired row
+/// costs as much as a pair with the distance `farthest`. Returns each row's column; -1 if it is
+/// unpaired, such as a row of NaN.
+std::vector<int> nearest_pairs(const Eigen::MatrixXd& distances, double farthest);
 
 }  // namespace dashpot::apps

@@ -1,4 +1,4 @@
-#include <dashpot/apps/report/mode_shares.hpp>
+#include <dashpot/apps/report/modes.hpp>
 #include <dashpot/apps/report/system_report.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/text/printable.hpp>

@@ -1,7 +1,5 @@
-#include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/apps/cli/drives_option.hpp>
+#include <dashpot/apps/cli/arm_option.hpp>
 #include <dashpot/apps/report/json.hpp>
-#include <dashpot/apps/report/mode_shares.hpp>
 #include <dashpot/apps/report/modes.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/run/run_report.hpp>

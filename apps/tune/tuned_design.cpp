@@ -1,5 +1,5 @@
 #include <dashpot/apps/report/json.hpp>
-#include <dashpot/apps/tune/tuned_design.hpp>
+#include <dashpot/apps/tune/tuned_loop.hpp>
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/input_error.hpp>

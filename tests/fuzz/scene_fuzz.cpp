@@ -1,5 +1,5 @@
 // The input as a scene of `dashpot run`, and the simulation's first ticks.
-#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/apps/scene/scene.hpp>
 #include <dashpot/tests/fuzz/fuzz_input.hpp>
 
 namespace {
