@@ -13,11 +13,11 @@ namespace dashpot::identification {
 
 /// The model that records support, and the results of the search.
 struct FoundModel {
-  DecayData data;                                   ///< that it is fitted to
-  DecayFit fit = {};                                ///< the model
-  std::vector<std::vector<RealizedPole>> by_order;  ///< from order 1
-  int order = 0;                                    ///< of the realization chosen
-  std::optional<DecayFit> larger = {};              ///< the best that was not worth its parameters
+  DecayData data;                                        ///< that it is fitted to
+  DecayFit fit = {};                                     ///< the model
+  std::vector<std::vector<RealizedPole>> by_order = {};  ///< from order 1
+  int order = 0;                                         ///< of the realization chosen
+  std::optional<DecayFit> larger = {};  ///< the best that was not worth its parameters
   /// Variance of each factor's `first` and `second` that parts of the records show beyond what
   /// each part's own deviations explain.
   std::vector<std::array<double, 2>> scatter = {};

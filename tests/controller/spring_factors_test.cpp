@@ -1,8 +1,8 @@
 // The small factorisations by themselves: against their definitions, and where they give up.
 #include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/base/small_cholesky.hpp>
-#include <dashpot/controller/law/spring_integral.hpp>
-#include <dashpot/controller/vibration/spring_factors.hpp>
+#include <dashpot/controller/law/impedance_law.hpp>
+#include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
