@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/controller/core/faults.hpp>
 #include <dashpot/controller/core/reference_generator.hpp>
-#include <dashpot/controller/core/thresholds.hpp>
+#include <dashpot/controller/core/sensed.hpp>
 #include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/law/energy_tank.hpp>
 #include <dashpot/controller/law/impedance_law.hpp>

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/core/thresholds.hpp>
+#include <dashpot/controller/core/sensed.hpp>
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/safety/motion_watch.hpp>
 #include <dashpot/controller/safety/safety_filter.hpp>

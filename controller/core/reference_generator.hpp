@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/core/thresholds.hpp>
+#include <dashpot/controller/core/sensed.hpp>
 #include <dashpot/controller/law/gain_blend.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/controller/motion/reference.hpp>
