@@ -25,7 +25,7 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A real part below this share of the fastest eigenvalue counts as zero.
-constexpr double kRounding = 1e-12;
+constexpr double kZeroReal = 1e-12;
 
 /// A number with a bound of its error.
 struct Bounded {
@@ -85,7 +85,7 @@ bool read_eigenvalues(const Eigen::Ref<const Eigen::VectorXcd>& values, double s
   }
   result.smallest_ratio = ratio;
   result.fastest_pole = fastest;
-  return ratio < kInfinity && slowest <= kRounding * std::abs(fastest);
+  return ratio < kInfinity && slowest <= kZeroReal * std::abs(fastest);
 }
 
 }  // namespace

@@ -65,10 +65,10 @@ class TouchingTip {
   /// Takes a direction with a smaller limit than the best so far. Returns whether it is smaller.
   bool take_if_worse(const Vector3d& n, ContactAt& best) const {
     if (!moves(n)) return false;
-    constexpr double kNear = 0.45;  // of the limit: the next step, of 2.25, is beyond it
+    constexpr double kNearLimit = 0.45;  // of the limit: the next step, of 2.25, is beyond it
     Touch here = touch(n);
     here.most = std::min(here.most, best.limit.stiffness);
-    if (std::isfinite(best.limit.stiffness)) here.coarse = kNear * best.limit.stiffness;
+    if (std::isfinite(best.limit.stiffness)) here.coarse = kNearLimit * best.limit.stiffness;
     const ContactLimit found = limit(here);
     if (!(found.stiffness < best.limit.stiffness)) return false;
     best = {n, found};

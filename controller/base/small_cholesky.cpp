@@ -70,7 +70,7 @@ namespace {
 
 constexpr int kMostSweeps = 12;
 /// Off-diagonal entries below this share of the largest entry are rounding errors.
-constexpr double kNothing = 1e-15;
+constexpr double kNegligibleEntry = 1e-15;
 /// Eigenvalues below this share of it are rounding errors; their roots would be 1e8 times as large.
 constexpr double kVanishes = 1e-13;
 
@@ -102,7 +102,7 @@ SymmetricRoot symmetric_root(const JointMatrix& A) noexcept {
     turned = false;
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = i + 1; j < n; ++j) {
-        if (!(std::abs(B[i][j]) > kNothing * largest)) continue;
+        if (!(std::abs(B[i][j]) > kNegligibleEntry * largest)) continue;
         turned = true;
         const double half = 0.5 * (B[j][j] - B[i][i]);
         const double t =

@@ -6,13 +6,17 @@
 #include <numbers>
 
 namespace dashpot::controller {
+namespace {
+
+constexpr double kFullTurn = 2 * std::numbers::pi;
+
+}  // namespace
 
 EnergyTank::EnergyTank(const RobotModel& model, const Settings& settings)
     : store_(settings.energy.from == Energy::From::kTank ? settings.energy.store : 0),
       period_(settings.period),
-      lag_(settings.analysis.sampled.cutoff > 0
-               ? 1 / (2 * std::numbers::pi * settings.analysis.sampled.cutoff)
-               : 0),
+      lag_(settings.analysis.sampled.cutoff > 0 ? 1 / (kFullTurn * settings.analysis.sampled.cutoff)
+                                                : 0),
       passed_(lag_ > 0 ? 1 - std::exp(-period_ / lag_) : 1),
       late_((settings.analysis.sampled.delay + 0.5) * period_ + lag_),
       weakened_(model.dof()),

@@ -47,7 +47,7 @@ double finite_or(double value, double otherwise) {
 }
 
 constexpr double kRatio = 0.7;
-constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 /// Damping at the tip lets the velocities of modes decay no faster than this, 1/s. A torque that is
 /// held for a period of 1 ms and arrives a period late becomes unstable at much faster decays.
@@ -57,7 +57,7 @@ constexpr double kFastestDecay = 200;
 
 bool lacks_efforts(const RobotModel& model) {
   constexpr int kArm = 4;  // least joints of an arm; for smaller rigs 100 N m is enough
-  return model.dof() >= kArm && model.joint_values(&Joint::effort).minCoeff() == kNoLimit;
+  return model.dof() >= kArm && model.joint_values(&Joint::effort).minCoeff() == kUnbounded;
 }
 
 Settings default_settings(const RobotModel& model) {
@@ -68,7 +68,7 @@ Settings default_settings(const RobotModel& model) {
   Limits& limits = settings.limits;
   limits.torque = limits.torque_rate = limits.velocity = none;
   limits.position_lower = limits.position_upper = none;
-  limits.external_torque = JointVector::Constant(n, kNoLimit);
+  limits.external_torque = JointVector::Constant(n, kUnbounded);
   JointVector middle = none;
   for (int i = 0; i < n; ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
@@ -105,11 +105,11 @@ Settings default_settings(const RobotModel& model) {
   gains.joint_damping = (2 * kRatio * kOmega * inertia).asDiagonal();
   // A damper 2 ratio omega m is the fastest for the fastest mode, whose omega^2 is at most
   // k_v / m_v + k_w / m_w: half for translation, half for rotation.
-  constexpr double kFastest = kFastestDecay / (2 * kRatio);  // rad/s
+  constexpr double kFastestMode = kFastestDecay / (2 * kRatio);  // rad/s
   const TipInertia least =
       least_tip_inertia(unloaded(model), limits.position_lower, limits.position_upper);
-  const double linear = std::min(400.0, 0.5 * kFastest * kFastest * least.linear);
-  const double angular = std::min(20.0, 0.5 * kFastest * kFastest * least.angular);
+  const double linear = std::min(400.0, 0.5 * kFastestMode * kFastestMode * least.linear);
+  const double angular = std::min(20.0, 0.5 * kFastestMode * kFastestMode * least.angular);
   gains.task_stiffness.diagonal() << linear, linear, linear, angular, angular, angular;
   settings.null_weights = JointVector::Ones(n);
   gains.null_stiffness = 0.25 * gains.joint_stiffness.diagonal();

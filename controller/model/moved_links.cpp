@@ -143,22 +143,22 @@ void doubt_sizes(const RobotModel& model, const std::vector<MovedLink>& links, d
 /// Doubts rotors heavier than the arm, and limits of joints that are hardly in rad.
 void doubt_joints(const RobotModel& model, const std::vector<MovedLink>& links, double reach,
                   std::vector<std::string>& warnings) {
-  constexpr double kTurn = 30;          // rad: five turns, as cables allow
-  constexpr double kSpeed = 20;         // rad/s
-  constexpr double kEffort = 1e4;       // N m
-  constexpr int kArm = 4;               // joints that make an arm
-  constexpr double kWrittenNone = 1e6;  // what files write for no limit
-  constexpr double kFriction = 2;       // times the effort limit, at the velocity limit
-  constexpr double kRotors = 0.1;       // of the arm's mass at its reach, in kg m^2
-  constexpr double kBare = 2e-4;  // kg m^2: if all rotors are below, they lack their gear ratios
-  constexpr double kHeavy = 5;    // kg: in an arm of at least this mass
+  constexpr double kTurn = 30;      // rad: five turns, as cables allow
+  constexpr double kSpeed = 20;     // rad/s
+  constexpr double kEffort = 1e4;   // N m
+  constexpr int kArm = 4;           // joints that make an arm
+  constexpr double kNoLimit = 1e6;  // what files write for no limit
+  constexpr double kFriction = 2;   // times the effort limit, at the velocity limit
+  constexpr double kRotors = 0.1;   // of the arm's mass at its reach, in kg m^2
+  constexpr double kBare = 2e-4;    // kg m^2: if all rotors are below, they lack their gear ratios
+  constexpr double kHeavy = 5;      // kg: in an arm of at least this mass
   double mass = model.attachment().mass;
   for (const MovedLink& link : links) mass += link.body.body.getMass();
   const auto doubt = [&](const Joint& joint, const std::string& what) {
     warnings.push_back(one_line("joint '" + joint.name + "': its " + what));
   };
   const auto limit = [&](const Joint& joint, double value, double most, const std::string& what) {
-    if (value > most && value < kWrittenNone) doubt(joint, "limit of " + what);
+    if (value > most && value < kNoLimit) doubt(joint, "limit of " + what);
   };
   if (lacks_efforts(model)) {
     warnings.emplace_back(
