@@ -236,7 +236,8 @@ def python_names():
         yield f"{prefix}{name}({', '.join(ast.unparse(base) for base in node.bases)})"
         lines = itertools.chain.from_iterable(members(part) for part in node.body)
         for called, group in itertools.groupby(lines, key=lambda line: "(" in line):
-            yield from group if called else ["  " + ";".join(group).replace(";  ", "; ").strip()]
+            listed = list(group)
+            yield from listed if called else ["  " + ";".join(listed).replace(";  ", "; ").strip()]
     for module in ("franka", "ros"):
         text = (folder / f"{module}.py").read_text(encoding="utf-8")
         names = re.findall(r'add_argument\("([\w-]+)"', text)
