@@ -1,9 +1,5 @@
 #include <dashpot/controller/core/faults.hpp>
-#include <dashpot/controller/posture.hpp>
-#include <dashpot/controller/posture_loop.hpp>
-#include <dashpot/controller/safety/brake.hpp>
-#include <dashpot/controller/settings_check.hpp>
-#include <dashpot/text/printable.hpp>
+#include <dashpot/controller/core/thresholds.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -78,47 +74,6 @@ bool Faults::brake_fails(Status found, Brake* brake) noexcept {
   const bool softer = brake->soften();  // it shakes the arm: make it as soft as possible
   while (brake->soften()) continue;
   return !softer;
-}
-
-namespace {
-
-constexpr double kGearMargin = 2;  // of gain: a brake leaves a gear's mode half of its damping
-constexpr double kEdge = 0.2;      // times the brake's T: edges of velocity intervals are this hard
-constexpr double kLongestBrakeTime = 1e3;  // s: no T is stable
-constexpr double kSearched = 1e3;          // times: range of the search for a boundary
-constexpr int kBrakePostures = 16;
-
-}  // namespace
-
-double gears_stopping_time(const RobotModel& model, const Settings& settings, double wanted) {
-  const SampledArm arm(model, timing_of(settings));
-  if (!arm.gears().any()) return 0;
-  const PostureSequence postures(settings.limits.position_lower, settings.limits.position_upper);
-  const JointVector rest = JointVector::Zero(model.dof());
-  DynamicsResult robot;
-  double T = kEdge * wanted;
-  for (int k = 0; k < kBrakePostures && T <= kLongestBrakeTime; ++k) {
-    arm.kernel().evaluate(postures.at(k), rest, robot);
-    const analysis::SampledLoop loop = with_gears(arm.at(postures.at(k)));
-    for (double margin = 0; margin == 0 && T <= kLongestBrakeTime;) {
-      analysis::System<kMaxJoints> system(model.dof());
-      system.mass = robot.M;
-      system.damping = robot.M * (kGearMargin / T);
-      system.damping.diagonal() += arm.friction();
-      arm.gears().extend(system);
-      margin = margin_up_to(system, loop, 1);
-      T = margin > 0 ? T / margin : kSearched * T;
-    }
-  }
-  if (T <= 1.01 * wanted) return T;
-  const std::string gears_keys = "(robot.gear_stiffness, gear_damping, position_sensor)";
-  throw InvalidSettings(
-      "limits.stopping_time",
-      "is " + text::number(settings.limits.stopping_time, 3) + " s, but with elastic gears " +
-          gears_keys +
-          (T > kLongestBrakeTime ? " no brake is stable: their damping is too small"
-                                 : " a brake keeps a gain margin of 2 from " + text::number(T, 3) +
-                                       " s on: set that"));
 }
 
 }  // namespace dashpot::controller

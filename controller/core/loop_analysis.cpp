@@ -1,4 +1,4 @@
-#include <dashpot/controller/core/controller_core.hpp>
+#include <dashpot/controller/core/loop_analysis.hpp>
 
 namespace dashpot::controller {
 

@@ -1,3 +1,4 @@
+#include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/loop_system.hpp>
 
 #include <cmath>

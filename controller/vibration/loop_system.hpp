@@ -2,7 +2,7 @@
 #include <dashpot/analysis/system.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/law/null_space.hpp>
-#include <dashpot/controller/vibration/closed_loop.hpp>
+#include <dashpot/controller/vibration/spring_factors.hpp>
 
 namespace dashpot::controller {
 

@@ -2,7 +2,7 @@
 // tests/sim/elastic_prediction_test.cpp.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/controller.hpp>
-#include <dashpot/controller/core/faults.hpp>
+#include <dashpot/controller/core/gears_stop.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/settings_check.hpp>
