@@ -9,7 +9,7 @@
 
 namespace dashpot::apps {
 
-/// What the operating system granted to a loop in real time.
+/// Rights that the operating system granted to a loop in real time.
 struct Privileges {
   bool scheduled = false;  ///< SCHED_FIFO
   bool locked = false;     ///< all memory stays resident

@@ -42,7 +42,7 @@ struct Alarms {
   std::int64_t changed_at_ = 0;  ///< tick of the last change of the wanted ratio
 };
 
-/// What a page shows at one time: the last message of each kind, and the alarms.
+/// The content of a page at one time: the last message of each kind, and the alarms.
 struct Frame {
   std::optional<state_t> state;
   std::optional<modes_t> modes;
