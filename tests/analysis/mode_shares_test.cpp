@@ -145,15 +145,21 @@ MatrixXd states_of(const ModalBasis<>& basis) {
   return Z;
 }
 
+/// Draws coordinates, and expects them from their state.
+void expect_coordinates(testing::Random& random, const System<>& system,
+                        const Spectrum<>& spectrum) {
+  const VectorXd xi = random.vector(8);
+  const VectorXd state = states_of(spectrum.basis) * xi;
+  const VectorXd found = coordinates<kDynamic>(spectrum.basis, system.mass, system.damping,
+                                               state.head(4), state.tail(4));
+  EXPECT_TRUE(near(found, xi, 1e-11));
+}
+
 TEST(Coordinates, AreThoseOfTheStateInTheBasis) {
   testing::Random random(51);
   for (const auto& make : {&testing::make_system_of_every_kind, &testing::make_defective_system}) {
     const auto [system, spectrum] = make(random);
-    const VectorXd xi = random.vector(8);
-    const VectorXd state = states_of(spectrum.basis) * xi;
-    const VectorXd found = coordinates<kDynamic>(spectrum.basis, system.mass, system.damping,
-                                                 state.head(4), state.tail(4));
-    EXPECT_TRUE(near(found, xi, 1e-11));
+    expect_coordinates(random, system, spectrum);
   }
 }
 
@@ -161,11 +167,7 @@ TEST(Coordinates, AreRefinedWhereTheLeftBasisIsInexact) {
   testing::Random random(52);
   auto [system, spectrum] = testing::make_system_of_every_kind(random);
   spectrum.basis.weight *= 1 + 1e-7;
-  const VectorXd xi = random.vector(8);
-  const VectorXd state = states_of(spectrum.basis) * xi;
-  const VectorXd found = coordinates<kDynamic>(spectrum.basis, system.mass, system.damping,
-                                               state.head(4), state.tail(4));
-  EXPECT_TRUE(near(found, xi, 1e-11));
+  expect_coordinates(random, system, spectrum);
 }
 
 TEST(Drive, IsTheChangeOfCoordinatesByAnImpulse) {

@@ -211,7 +211,7 @@ TEST(Tree, IncludesOnlyWhatTheTableOfRoomsAllows) {
   EXPECT_THAT(offences, IsEmpty());
 }
 
-// Of another library, in quotes, of higher steps, unknown.
+// The bad includes: another library, quotes, a higher step, an unknown header.
 TEST(Rooms, AllowOnlyLowerStepsAndPublicHeaders) {
   const std::string bad =
       "#include <kdl/chain.hpp>\n #  include \"types.hpp\"  // why\n"
