@@ -12,13 +12,14 @@ URDF = '''<robot name="flywheel"><link name="base"/><link name="wheel"><inertial
 <origin xyz="0 0 0"/><inertia ixx="0.5" iyy="0.5" izz="0.5" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="axle" type="revolute"><parent link="base"/><child link="wheel"/><axis xyz="0 0 1"/>
 <limit lower="-3" upper="3" effort="50" velocity="20"/><dynamics damping="0" friction="0"/></joint></robot>'''
-SCENE = '''
+LIVE_SCENE = '''
 robot: {urdf: wheel.urdf, base: base, tip: wheel}
 gains: {joint: {stiffness: [50], damping: [4]}}
 scenario:
-  duration: 60 s
+  duration: 10000 s
   start: {position: [0.3]}
-  steps:
+'''
+SCENE = LIVE_SCENE + '''  steps:
     - {at: 3 s, gains: {joint: {stiffness: [200], damping: [4]}}}
 '''
 INERTIA = 0.5
@@ -38,6 +39,7 @@ class Page(PageTest):
         super().setUpClass()
         write('wheel.urdf', URDF)
         cls.scene = write('wheel.yaml', SCENE)
+        cls.live_scene = write('live.yaml', LIVE_SCENE)
         cls.log = os.path.join(FOLDER, 'wheel.lcm')
         run('run', cls.scene, '--fast', '--duration', '6', '--log', cls.log)
 
@@ -126,18 +128,20 @@ class Page(PageTest):
 
     def test_follows_a_change_of_gains_and_survives_a_restart(self):
         url = f'udpm://239.255.76.67:{20000 + os.getpid() % 30000}?ttl=0'
-        site = Site('--lcm-url', url, '--config', self.scene)
+        site = Site('--lcm-url', url, '--config', self.live_scene)
         self.browser.open(site.url)
         self.browser.until("$('#link')?.textContent.includes('connected')")
         self.browser.until("$('#link')?.textContent.includes('waiting')")
-        loop = subprocess.Popen([PROGRAM, 'run', self.scene, '--lcm-url', url], stdout=subprocess.DEVNULL,
-                                stderr=subprocess.DEVNULL)
+        loop = subprocess.Popen([PROGRAM, 'run', self.live_scene, '--commands', '--lcm-url', url],
+                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             try:
-                self.browser.until('dashpot.frame && dashpot.frame.messages > 0', 5)
+                self.browser.until('dashpot.frame && dashpot.frame.messages > 0', 60)
             except RuntimeError:
                 self.skipTest('multicast does not work on this machine')
             for stiffness in (50, 200):
+                run('command', '--joint-stiffness', str(stiffness), '--joint-damping', '4', '--lcm-url', url,
+                    '--timeout', '600')
                 re, im = poles(stiffness, 4)
                 self.browser.until(f'dashpot.poles.length == 2 && '
                                    f'Math.abs(Math.abs(dashpot.poles[0].im) - {im}) < 1e-6')

@@ -77,12 +77,12 @@ class States(PageTest):
         url = f'udpm://239.255.76.67:{20000 + os.getpid() % 30000}?ttl=0'
         scene = os.path.join(SOURCE, 'sim/scenes/panda_release_ratio_damping.yaml')
         site = Site('--lcm-url', url, '--config', scene)
-        loop = subprocess.Popen([PROGRAM, 'run', scene, '--duration', '60', '--lcm-url', url],
+        loop = subprocess.Popen([PROGRAM, 'run', scene, '--duration', '10000', '--lcm-url', url],
                                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             self.browser.open(site.url)
             try:
-                self.browser.until('window.dashpot && dashpot.frame && dashpot.frame.messages > 0', 5)
+                self.browser.until('window.dashpot && dashpot.frame && dashpot.frame.messages > 0', 60)
             except RuntimeError:
                 self.skipTest('multicast does not work on this machine')
             self.browser.until("$('#link').className == 'badge good'")
