@@ -10,7 +10,7 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kMargin = 2;      // of gain: a brake leaves a gear's mode half of its damping
+constexpr double kGearMargin = 2;  // of gain: a brake leaves a gear's mode half of its damping
 constexpr double kEdge = 0.2;      // times the brake's T: edges of velocity intervals are this hard
 constexpr double kLongest = 1e3;   // s: no T is stable
 constexpr double kSearched = 1e3;  // times: range of the search for a boundary
@@ -31,7 +31,7 @@ double gears_stopping_time(const RobotModel& model, const Settings& settings, do
     for (double margin = 0; margin == 0 && T <= kLongest;) {
       analysis::System<kMaxJoints> system(model.dof());
       system.mass = robot.M;
-      system.damping = robot.M * (kMargin / T);
+      system.damping = robot.M * (kGearMargin / T);
       system.damping.diagonal() += arm.friction();
       arm.gears().extend(system);
       margin = margin_up_to(system, loop, 1);
