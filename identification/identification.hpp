@@ -60,6 +60,9 @@ struct Identification {
   Eigen::VectorXd noise;  ///< of each channel: standard deviation of the residual
   double whiteness = 1;   ///< factor on variances, above 1 if the residual is not white
   double explained = 0;   ///< share of the squares of the motion that the model explains, 0 to 1
+  /// Coulomb friction of one channel's decays, as the deflection whose spring it balances, in the
+  /// channel's unit; 0: the model has none.
+  double friction = 0, friction_std = 0;
 };
 
 /// Identifies the modes of free decays: all records begin near one equilibrium, after the
@@ -74,7 +77,9 @@ struct Identification {
 /// searched for more modes. So neither gaps nor uneven time steps matter, and heavily damped modes
 /// are as good as the record allows. If there are more decays than as many joints can have, a
 /// second search includes the products of the two strongest oscillations in the model,
-/// e^((lambda_i + lambda_j) t): the second-order response of a weakly nonlinear arm.
+/// e^((lambda_i + lambda_j) t): the second-order response of a weakly nonlinear arm. Decays of one
+/// moving channel in which no mode is believed are fitted with Coulomb friction
+/// (rubbing_decay.hpp).
 ///
 /// The standard deviations follow from maximum likelihood (inverse of Fisher's information, with
 /// the noise of the residual). They are enlarged if the residual is not white, and by the

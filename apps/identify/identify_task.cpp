@@ -143,10 +143,12 @@ class Task {
       });
       const double length = parts_.list[group.front()].record.time(Eigen::last) -
                             parts_.list[group.front()].record.time[0];
-      const bool fades = std::any_of(
-          posture.found.modes.begin(), posture.found.modes.end(), [length](const auto& mode) {
-            return mode.damping_ratio * mode.natural_frequency * length > kFades;
-          });
+      const bool fades =
+          posture.found.friction > 0 ||
+          std::any_of(posture.found.modes.begin(), posture.found.modes.end(),
+                      [length](const auto& mode) {
+                        return mode.damping_ratio * mode.natural_frequency * length > kFades;
+                      });
       const bool linear = posture.found.explained > kExplains &&
                           posture.found.modes.size() <= report_.channels.size();
       if (large && !(linear && fades)) {

@@ -237,6 +237,10 @@ Json posture_json(const PostureReport& posture, bool against) {
   json["noise"] = json_list(posture.found.noise);
   json["whiteness"] = posture.found.whiteness;
   json["explained"] = posture.found.explained;
+  if (posture.found.friction > 0) {
+    json["friction"] = posture.found.friction;
+    json["friction_std"] = posture.found.friction_std;
+  }
   return json;
 }
 
@@ -270,6 +274,11 @@ std::string identify_table(const IdentifyReport& report) {
             "; the model explains " + format_number(100 * posture.found.explained, 6) +
             " % of the " + (report.kind == MotionKind::kAmbient ? "correlations" : "motion") +
             "\n" + modes_table(posture, report.channels);
+    if (posture.found.friction > 0) {
+      text += "  with Coulomb friction worth " +
+              with_deviation(posture.found.friction, posture.found.friction_std) + " " +
+              report.channels.front().unit + " of deflection\n";
+    }
     if (!posture.found.rejected.empty()) text += "\n" + rejected_table(posture.found.rejected);
     if (report.against) text += "\n" + against_table(posture);
   }

@@ -5,6 +5,7 @@
 #include <dashpot/identification/search/measured_modes.hpp>
 #include <dashpot/identification/search/model_search.hpp>
 #include <dashpot/identification/search/moving_channels.hpp>
+#include <dashpot/identification/search/rubbing_decay.hpp>
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -171,6 +172,10 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
   }
   Identification result = describe(find_model(moving.records, options), moving.records);
   for (const SteadyLine& hum : hums) result.rejected.push_back(to_mode(hum));
+  if (moving.channels.size() == 1 && options.refine) {
+    if (auto rubbing = identify_rubbing(MovingChannels(records).records))
+      result = std::move(*rubbing);
+  }
   return moving.of_all(std::move(result));
 }
 

@@ -3,6 +3,7 @@
 #include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
+#include <dashpot/identification/search/rubbing_decay.hpp>
 
 #include <algorithm>
 #include <array>
@@ -181,6 +182,15 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
     starts.push_back(peak + static_cast<Index>(share * static_cast<double>(to - peak)));
   }
   starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
+  // A joint that rubs may be taken from the first.
+  if (record.output.rows() == 1 && to - from >= kLeast) {
+    for (const Index start : {from, peak}) {
+      if (to - start >= kLeast && identify_rubbing({part_of(record, start, to)})) {
+        decay.from = start;
+        return decay;
+      }
+    }
+  }
   // Digits that do not change do not mean motion without noise.
   const VectorXd enough = (kEnough * motion_of(part_of(record, from, to))).cwiseMax(noise);
   // Mean logarithm of a model's residual from a start on; none if too little follows.

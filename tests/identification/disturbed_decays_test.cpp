@@ -87,6 +87,96 @@ TEST(DisturbedDecays, FastModesAreThereHoweverLongTheRecord) {
   }
 }
 
+/// A joint that is let go, and what its friction does beside a spring that it balances at
+/// `friction`; by small steps of its equation, at random with noise or rounded by an encoder.
+struct Joint {
+  Oscillator mode{};
+  double friction = 0;
+  MotionRecord record;
+
+  /// `force(v)` scales the friction, by the speed in units of omega.
+  template <typename Force>
+  Joint(Dice& draw, double weight, const Force& force) {
+    mode = {draw.log_uniform(3, 40), draw.log_uniform(0.005, 0.15)};
+    friction = weight * draw.log_uniform(0.01, 0.05);
+    constexpr Index kSteps = 200;
+    const double step = 2 * std::numbers::pi / mode.w / 30, h = step / kSteps;
+    const double noise = draw.log_uniform(1e-4, 3e-3), rest = draw.normal();
+    const bool rounded = draw.integer(0, 1) == 1;
+    constexpr Index kSamples = 400;
+    record = {Eigen::VectorXd(kSamples), Eigen::MatrixXd(1, kSamples), {}};
+    double y = 1, v = 0;
+    for (Index i = 0; i < kSamples; ++i) {
+      record.time[i] = step * static_cast<double>(i);
+      const double seen = rest + y;
+      record.output(0, i) =
+          rounded ? 3 * noise * std::round(seen / (3 * noise)) : seen + noise * draw.normal();
+      for (Index k = 0; k < kSteps; ++k) {
+        const double pull = -mode.w * mode.w * y - 2 * mode.z * mode.w * v;
+        const double most = mode.w * mode.w * friction * force(v / mode.w);
+        const double free = v + h * pull;  // friction at most stops it
+        v = std::abs(free) < h * most ? 0 : free - std::copysign(h * most, free);
+        y += h * v;
+      }
+    }
+  }
+};
+
+TEST(DisturbedDecays, AJointThatRubsHasItsModeAndItsFriction) {
+  int found = 0, inside = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Dice draw(400 + seed);
+    // Every other joint creeps: its friction fades at small speeds.
+    const double slow = seed % 2 == 0 ? 0 : 0.02;
+    const Joint joint(draw, 1,
+                      [slow](double v) { return slow > 0 ? std::tanh(std::abs(v) / slow) : 1; });
+    const auto decays = find_decays(joint.record);
+    ASSERT_EQ(decays.size(), 1U) << seed;
+    const Identification result =
+        identify_decays({part_of(joint.record, decays[0].from, decays[0].to)});
+    if (!(result.friction > 0)) continue;
+    ++found;
+    ASSERT_EQ(result.modes.size(), 1U) << seed;
+    const MeasuredMode& mode = result.modes[0];
+    EXPECT_NEAR(mode.natural_frequency, joint.mode.w, 2e-3 * joint.mode.w) << seed;
+    EXPECT_NEAR(mode.damping_ratio, joint.mode.z, 5e-3) << seed;
+    EXPECT_NEAR(result.friction, joint.friction, 0.1 * joint.friction) << seed;
+    inside += std::abs(mode.damping_ratio - joint.mode.z) < 1.96 * mode.damping_ratio_std &&
+              std::abs(result.friction - joint.friction) < 1.96 * result.friction_std;
+  }
+  EXPECT_GE(found, 18);
+  EXPECT_GE(inside, found - 3);
+}
+
+/// Neither in a joint without friction, nor one that is held back by the square of its speed, nor
+/// in two modes of one channel.
+TEST(DisturbedDecays, NoFrictionIsFoundWhereThereIsNone) {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    Dice draw(500 + seed);
+    for (const double weight : {0.0, 3.0}) {
+      const Joint joint(draw, weight, [](double v) { return v * v; });
+      EXPECT_EQ(identify_decays({joint.record}).friction, 0) << seed << ", " << weight;
+    }
+    MotionRecord two = record_of(3, 0.005, 1e-5, draw, [](const Oscillator& mode, double t) {
+      return Oscillator{mode.w, 0.3 * mode.z}.released(t);
+    });
+    two.output.conservativeResize(1, Eigen::NoChange);
+    EXPECT_EQ(identify_decays({two}).friction, 0) << seed;
+  }
+}
+
+TEST(DisturbedDecays, ReleasesOfAJointThatRubsShareModeAndFriction) {
+  Dice draw(600);
+  const Joint joint(draw, 1, [](double) { return 1.0; });
+  MotionRecord other = joint.record;  // later, and about another rest
+  other = part_of(other, 7, other.time.size());
+  other.output.array() += 0.3;
+  const Identification found = identify_decays({joint.record, other});
+  ASSERT_EQ(found.modes.size(), 1U);
+  EXPECT_NEAR(found.modes[0].natural_frequency, joint.mode.w, 1e-3 * joint.mode.w);
+  EXPECT_NEAR(found.friction, joint.friction, 0.05 * joint.friction);
+}
+
 TEST(DisturbedDecays, AHumIsTakenAwayAndMakesNoAmbientMotion) {
   for (const double size : {1e-3, 1e-2}) {
     Dice draw(52);

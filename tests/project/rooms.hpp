@@ -66,7 +66,10 @@ inline const std::vector<Room>& rooms() {
 
       {"identification/records", 0, {"motion_record", "motion_verdict"}, {kAnalysis, kFft, kEigen}},
       {"identification/model", 1, {}, {kAnalysis, kFft, kEigen}},
-      {"identification/search", 2, {"identification"}, {kAnalysis, kEigen}},
+      {"identification/search",
+       2,
+       {"identification"},
+       {kAnalysis, kEigen, "unsupported/Eigen/LevenbergMarquardt"}},
       {"identification/check_model",
        0,
        {"check_model", "torque_record"},
