@@ -16,7 +16,7 @@ export class Tuning {
   old = {a: false, b: false};       // whether the answers are of other designs
   chosen = null;                    // number of the mode whose shape is shown
   current = false;                  // whether all that is shown is of the state
-  later = 0;
+  later = 0;                        // timer of what is drawn soon
 
   /// `changed` is called when the state has changed, `redraw` with the names of parts to be drawn again.
   constructor(setup, changed, redraw) {
@@ -64,15 +64,19 @@ export class Tuning {
     $('link').className = 'badge bad';
     clearTimeout(this.later);
     const waits = kDesigns.some((one) => one !== name && this.questions[one].busy);
-    this.later = setTimeout(() => this.redraw('arm', 'poles', 'motion', 'texts'), waits ? kTogether : 0);
+    this.later = setTimeout(() => {
+      this.later = 0;
+      this.redraw('arm', 'poles', 'motion', 'texts');
+    }, waits ? kTogether : 0);
     const {a, b} = this.state, all = Object.values(this.questions);
     if (all.every((question) => !question.busy || !question.next)) this.workspace.look({a, b});
   }
   /// Notes whether all that is shown is of the state.
   noteDrawn() {
     const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
-    this.current = kDesigns.every((name) => this.asked[name] && same(this.asked[name].design, this.design(name)) &&
-      same(this.asked[name].q, this.state.q) && (this.asked[name].touches || 0) === this.state.touches);
+    this.current = !this.later && kDesigns.every((name) => this.asked[name] &&
+      same(this.asked[name].design, this.design(name)) && same(this.asked[name].q, this.state.q) &&
+      (this.asked[name].touches || 0) === this.state.touches);
   }
 
   /// Sets the damping for the wanted ratio at this posture: the matrix for all modes, or a diagonal with that smallest
