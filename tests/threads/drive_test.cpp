@@ -1,6 +1,7 @@
 // `dashpot drive` with `dashpot fake-driver`: what it answers, what it refuses, and what becomes of
 // a driver's troubles.
 #include <dashpot/controller/plugin.h>
+#include <dashpot/controller/tick_status.hpp>
 #include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/threads/drive_arms.hpp>
@@ -69,7 +70,10 @@ class Drive : public AtPace, public ::testing::WithParamInterface<Arm> {
           "commands: {silence: 30 s, oldest: 20 s}\nwatchdog: {longest_gap: 200 ms}\nanalysis:"}});
   }
   /// Whether the program went without time for so long that the loop ended for good reason.
-  static bool lost_pace(const std::vector<state_t>& states) {
+  static bool lost_pace(const Json& summary, const std::vector<state_t>& states) {
+    for (const auto late : {controller::Status::kTimeGap, controller::Status::kWrongRate}) {
+      if (summary["tick_statuses"].contains(controller::to_text(late))) return true;
+    }
     constexpr std::int64_t kLongestGap = 200'000;  // us, of patient_configuration
     return std::adjacent_find(states.begin(), states.end(), [](const auto& a, const auto& b) {
              return b.utime - a.utime > kLongestGap;
@@ -129,7 +133,7 @@ void Drive::hold_and_move() {
   const Json result = summary_of(driving);
   fake.send(SIGTERM);
   const std::vector<state_t> states = states_of(log);
-  if (lost_pace(states)) GTEST_SKIP() << kNoPace;
+  if (lost_pace(result, states)) GTEST_SKIP() << kNoPace;
   EXPECT_TRUE(arrived) << listener.state.joint_position[0] - start;
   EXPECT_EQ(fake.finish(), 0) << fake.complaints();
   EXPECT_EQ(result["driver"], std::string(arm.option).substr(2));
@@ -184,7 +188,7 @@ TEST_P(Drive, GoesToTheGoalsOfAScenario) {
   const Json result = summary_of(driving);
   fake.send(SIGTERM);
   const std::vector<state_t> states = states_of(log);
-  if (lost_pace(states)) GTEST_SKIP() << kNoPace;
+  if (lost_pace(result, states)) GTEST_SKIP() << kNoPace;
   EXPECT_EQ(result["ended"], "ended after its time");
   ASSERT_FALSE(states.empty());
   double goal = 0;
@@ -206,10 +210,10 @@ TEST_P(Drive, StopsTheArmBeforeTheTorqueFades) {
   const bool moves =
       command_until(listener, command, [&] { return listener.state.joint_velocity[0] > 0.1; });
   driving.send(SIGTERM);
-  const Json ended = summary_of(driving)["ended"];
+  const Json result = summary_of(driving), ended = result["ended"];
   fake.send(SIGTERM);
   const std::vector<state_t> states = states_of(log);
-  if (ended == "ended by the user, without the driver" || lost_pace(states)) {
+  if (ended == "ended by the user, without the driver" || lost_pace(result, states)) {
     GTEST_SKIP() << kNoPace;
   }
   ASSERT_TRUE(moves);
