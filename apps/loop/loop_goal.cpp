@@ -216,11 +216,6 @@ void LoopGoal::note_fault(bool latched) noexcept {
   faulted_ = latched;
 }
 
-std::int32_t LoopGoal::change_gains(const std::function<void(controller::Gains&)>& change,
-                                    std::string& reason) {
-  return this->change({change, {}, {}, {}}, reason);
-}
-
 std::int32_t LoopGoal::change(const Change& change, std::string& reason) {
   const std::lock_guard lock(mutex_);
   if (!begun_) {

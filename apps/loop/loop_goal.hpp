@@ -78,10 +78,6 @@ class LoopGoal {
 
   // Other threads, which may have to wait for each other. Before begin() changes are refused
   // (DASHPOT_NOTHING_YET) and releases do nothing, because the controller is being started:
-  /// Changes the active gains; DASHPOT_OK, or the code of the controller's refusal, with its reason
-  /// in one line.
-  std::int32_t change_gains(const std::function<void(controller::Gains&)>& change,
-                            std::string& reason);
   /// Changes by a command or a scenario beside the set-point; empty parts stay as they are.
   struct Change {
     std::function<void(controller::Gains&)> gains;
@@ -89,8 +85,8 @@ class LoopGoal {
     std::optional<controller::Pose> tool;  ///< T in the tip link
     std::optional<controller::TipSpeed> tip_speed;
   };
-  /// Makes all of a change, or nothing if the controller refuses its result. Warnings of the
-  /// controller go to stderr. Otherwise as change_gains().
+  /// Makes all of a change, or nothing if the controller refuses its result: DASHPOT_OK, or the code
+  /// of the refusal, with its reason in one line. Warnings of the controller go to stderr.
   std::int32_t change(const Change& change, std::string& reason);
   /// The last T in the tip link for the controller; the loop may not have taken it up yet.
   controller::Pose latest_tool();

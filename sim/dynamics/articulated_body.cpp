@@ -155,14 +155,6 @@ Vector6 ArticulatedBody::tip_twist() const noexcept {
   return twist;
 }
 
-void ArticulatedBody::transposed_jacobian(const Vector6& wrench, double* tau) const noexcept {
-  Vector6 force = force_at(tip_position(), wrench.head<3>());
-  force.tail<3>() += wrench.tail<3>();
-  for (int i = 0; i < robot_->dof(); ++i) {
-    tau[i] = bodies_[static_cast<std::size_t>(i)].axis.dot(force);
-  }
-}
-
 double ArticulatedBody::kinetic_energy() const noexcept {
   double energy = 0;
   for (std::size_t i = 0; i < robot_->joints().size(); ++i) {

@@ -39,10 +39,8 @@ class ArticulatedBody {
   Pose tip_pose() const noexcept;
   /// p_BT_B, m
   Eigen::Vector3d tip_position() const noexcept;
-  /// tau = J' w: the joint torques of the wrench at the tip, N m.
+  /// Velocity and angular velocity of the tip in the base, m/s and rad/s.
   Vector6 tip_twist() const noexcept;
-  /// tau = J' w: what the wrench at the tip amounts to in the joints, N m.
-  void transposed_jacobian(const Vector6& wrench, double* tau) const noexcept;
   /// g(q), n, N m: the torques that hold the weight.
   void weight(double* tau) const noexcept;
   /// (qd' M qd) / 2 with the armatures of joints whose gears are rigid, J

@@ -85,7 +85,6 @@ TEST_F(Goal, RefusesChangesUntilTheLoopHasBegun) {
   LoopGoal::Change all{ratio(0.5), controller::Payload{2}, {}, controller::TipSpeed{.linear = 0.1}};
   EXPECT_EQ(goal.change(all, reason), DASHPOT_NOTHING_YET);
   EXPECT_EQ(reason, "the loop has not begun");
-  EXPECT_EQ(goal.change_gains(ratio(0.5), reason), DASHPOT_NOTHING_YET);
   goal.release();
   EXPECT_THAT(notes.calls, IsEmpty());
   goal.begin(setpoint, {});
