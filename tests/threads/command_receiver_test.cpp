@@ -290,13 +290,13 @@ TEST(CommandReceiver, OutlivesItsSenders) {
     for (int i = 0; i < 2000 && !through; ++i) {
       sender.send_good();
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      through = receiver.fetch();
+      // The first sender's last commands may come late.
+      through = receiver.fetch() && sender.is_one(receiver.command());
     }
     if (!through && receiver.tally().rejected() == 0) {
       GTEST_SKIP() << "multicast does not work on this machine: " << url;
     }
     ASSERT_TRUE(through) << first_sequence;
-    EXPECT_TRUE(sender.is_one(receiver.command()));
   }
   EXPECT_GT(receiver.tally().count(Verdict::kReplayed), 0);
 }
