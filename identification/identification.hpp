@@ -78,8 +78,8 @@ struct Identification {
 /// are as good as the record allows. If there are more decays than as many joints can have, a
 /// second search includes the products of the two strongest oscillations in the model,
 /// e^((lambda_i + lambda_j) t): the second-order response of a weakly nonlinear arm. Decays of one
-/// moving channel in which no mode is believed are fitted with Coulomb friction
-/// (rubbing_decay.hpp).
+/// moving channel are fitted with Coulomb friction as well (rubbing_decay.hpp), which is believed
+/// where it is determined.
 ///
 /// The standard deviations follow from maximum likelihood (inverse of Fisher's information, with
 /// the noise of the residual). They are enlarged if the residual is not white, and by the

@@ -275,9 +275,11 @@ std::string identify_table(const IdentifyReport& report) {
             " % of the " + (report.kind == MotionKind::kAmbient ? "correlations" : "motion") +
             "\n" + modes_table(posture, report.channels);
     if (posture.found.friction > 0) {
+      Eigen::Index moving = 0;  // the others are constant
+      posture.found.noise.maxCoeff(&moving);
       text += "  with Coulomb friction worth " +
               with_deviation(posture.found.friction, posture.found.friction_std) + " " +
-              report.channels.front().unit + " of deflection\n";
+              report.channels[static_cast<std::size_t>(moving)].unit + " of deflection\n";
     }
     if (!posture.found.rejected.empty()) text += "\n" + rejected_table(posture.found.rejected);
     if (report.against) text += "\n" + against_table(posture);

@@ -23,6 +23,8 @@ constexpr double kSearched = 3000, kShortestSearched = 200;
 /// Noise over the sensors' rounding: below this the residual consists of steps. Estimates of it
 /// scatter so much.
 constexpr double kRounds = 1.2;
+/// Noise of one model over the noise of another: below this both explain a motion as well.
+constexpr double kAsWell = 1.2;
 
 /// The shape of a factor's first eigenvalue, from its amplitudes.
 VectorXcd shape_of(const DecayFactor& factor, const MatrixXd& amplitude) {
@@ -173,8 +175,17 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
   Identification result = describe(find_model(moving.records, options), moving.records);
   for (const SteadyLine& hum : hums) result.rejected.push_back(to_mode(hum));
   if (moving.channels.size() == 1 && options.refine) {
-    if (auto rubbing = identify_rubbing(MovingChannels(records).records))
-      result = std::move(*rubbing);
+    const auto rubbing = identify_rubbing(MovingChannels(records).records);
+    if (rubbing && !rubbing->modes.empty()) {
+      result = *rubbing;
+    } else if (rubbing && result.order > 2 && rubbing->noise[0] < kAsWell * result.noise[0]) {
+      for (MeasuredMode& mode : result.modes) {
+        mode.reason = "friction explains the motion as well, and too few turns tell";
+        mode.not_linear = true;
+        result.rejected.push_back(std::move(mode));
+      }
+      result.modes.clear();
+    }
   }
   return moving.of_all(std::move(result));
 }

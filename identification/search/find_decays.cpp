@@ -185,7 +185,9 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
   // A joint that rubs may be taken from the first.
   if (record.output.rows() == 1 && to - from >= kLeast) {
     for (const Index start : {from, peak}) {
-      if (to - start >= kLeast && identify_rubbing({part_of(record, start, to)})) {
+      const auto rubbing =
+          to - start < kLeast ? std::nullopt : identify_rubbing({part_of(record, start, to)});
+      if (rubbing && !rubbing->modes.empty()) {
         decay.from = start;
         return decay;
       }

@@ -1,6 +1,8 @@
+#include <dashpot/identification/records/ambient_correlations.hpp>
 #include <dashpot/identification/records/common.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
 #include <dashpot/identification/records/motion_kind.hpp>
+#include <dashpot/identification/search/measured_modes.hpp>
 #include <dashpot/identification/search/rubbing_decay.hpp>
 
 #include <algorithm>
@@ -16,12 +18,18 @@ namespace {
 
 constexpr int kFewestTurns = 4;        ///< fewer show friction and damping as one
 constexpr double kSureFriction = 0.2;  ///< relative deviation: known less well, it is not believed
-constexpr double kSureFrequency = 0.05;  ///< relative deviation
+constexpr double kLikelyFriction = 0.5;  ///< relative deviation: it is there, whatever its size
+constexpr double kSureFrequency = 0.05;  ///< relative deviation, and of the ratio
 constexpr double kNoiseWhiteness = 1.5;  ///< growth of variances: with more it is not noise
 constexpr double kMostRatio = 0.98;      ///< with more it does not turn
 constexpr double kFirstMotion = 0.12;    ///< of a period: position and speed are read there
 constexpr double kSearchSamples = 2000;  ///< of a record, for a start
 constexpr double kStep = 1e-6;           ///< of all parameters, for differences
+constexpr double kOnlyRounding = 1e-8;   ///< of the motion: a smaller residual is rounding
+constexpr Index kFarthestLag = 2000;
+constexpr std::size_t kMostRecords = 8;  ///< more take long and add little
+constexpr double kOfChange = 2;          ///< deviations: by which fewer samples show otherwise
+constexpr double kNotCompared = 2;       ///< factor on deviations that fewer samples cannot check
 constexpr int kRefined = 4;              ///< of the starts
 constexpr double kFirstPeriods = 4;      ///< over which a coarse frequency is a start
 /// Starts: of the pace, damping ratios, and shares of the motion.
@@ -36,8 +44,8 @@ constexpr auto kLeastSizes = std::to_array<double>({0, 1.5, 2, 3, 4, 6, 9});
 constexpr auto kNotConstant = std::to_array<double>({2e-4, 3e-4, 0.01});
 
 // The parameters: log(omega), zeta and log(friction), then of each record rest, position and speed
-// / omega at its beginning; all lengths in units of the largest motion.
-constexpr Index kCommon = 3, kOwn = 3;
+// / omega at its beginning, and a drift in 1/s; all lengths in units of the largest motion.
+constexpr Index kCommon = 3, kOwn = 4;
 
 struct Samples {
   VectorXd time, output;  ///< s, from the record's beginning
@@ -73,7 +81,7 @@ VectorXd motion_of(const VectorXd& p, Index record, const VectorXd& time,
     if (turns != nullptr) turns->push_back({end, std::abs(at - rest)});
   }
   y.tail(time.size() - i).setConstant(at);
-  return y;
+  return y + p[kCommon + kOwn * record + 3] * time;
 }
 
 Index count_of(const std::vector<Samples>& all) {
@@ -161,7 +169,7 @@ VectorXd started(const std::vector<Samples>& all, double frequency) {
     longest = std::max(longest, all[r].time(Eigen::last));
     auto own = p.segment<kOwn>(kCommon + kOwn * static_cast<Index>(r));
     own << all[r].output.tail((all[r].time.array() >= last).count()).mean(),
-        beginning_of(all[r], frequency);
+        beginning_of(all[r], frequency), 0;
   }
   double periods = kFirstPeriods;
   std::vector<Samples> some = beginnings(all, period, periods);
@@ -189,10 +197,12 @@ VectorXd started(const std::vector<Samples>& all, double frequency) {
   return p;
 }
 
-/// The factor by which the correlation of a residual enlarges the variance of its means.
+/// The factor by which the correlation of a residual enlarges the variance of its means; 1 where
+/// the residual is rounding.
 double growth_of(const VectorXd& rest) {
   double growth = 1;
-  for (Index lag = 1; lag < rest.size() / 4; ++lag) {
+  if (rest.cwiseAbs().maxCoeff() < kOnlyRounding) return growth;
+  for (Index lag = 1; lag < std::min(rest.size() / 4, kFarthestLag); ++lag) {
     const double like = rest.head(rest.size() - lag).dot(rest.tail(rest.size() - lag));
     if (like <= 0) break;
     growth += 2 * like / rest.squaredNorm();
@@ -200,12 +210,12 @@ double growth_of(const VectorXd& rest) {
   return growth;
 }
 
-/// The samples up to the last turn that is larger; empty if there are too few turns.
-Samples until(const Samples& samples, const std::vector<Turn>& turns, double size) {
+/// The samples up to the last turn that is larger; empty if fewer turns are.
+Samples until(const Samples& samples, const std::vector<Turn>& turns, double size, int fewest) {
   const auto large = std::count_if(turns.begin(), turns.end(), [&](const Turn& turn) {
     return turn.size > size && turn.time <= samples.time(Eigen::last);
   });
-  if (large < kFewestTurns) return {};
+  if (large < fewest) return {};
   const double last = turns[static_cast<std::size_t>(large) - 1].time;
   const Index n = (samples.time.array() <= last).count();
   return {samples.time.head(n), samples.output.head(n)};
@@ -213,18 +223,19 @@ Samples until(const Samples& samples, const std::vector<Turn>& turns, double siz
 
 struct RubbingFit {
   VectorXd parameters, std;  ///< std of the common ones
-  double covariance = 0;     ///< of the first two
+  double correlation = 0;    ///< of the first two
   double growth = 0, variance = 0, explained = 0;
 };
 
 /// Refines a fit on the samples before the turns whose size is `least` frictions.
-std::optional<RubbingFit> fit_until(const std::vector<Samples>& all, VectorXd p, double least) {
+std::optional<RubbingFit> fit_until(const std::vector<Samples>& all, VectorXd p, double least,
+                                    int fewest = kFewestTurns) {
   std::vector<Samples> used;
   double motion = 0;
   for (std::size_t r = 0; r < all.size(); ++r) {
     std::vector<Turn> turns;
     motion_of(p, static_cast<Index>(r), all[r].time, &turns);
-    const Samples& there = used.emplace_back(until(all[r], turns, least * std::exp(p[2])));
+    const Samples& there = used.emplace_back(until(all[r], turns, least * std::exp(p[2]), fewest));
     if (there.time.size() == 0) return {};
     motion += (there.output.array() - there.output.mean()).square().sum();
   }
@@ -246,32 +257,25 @@ std::optional<RubbingFit> fit_until(const std::vector<Samples>& all, VectorXd p,
       fit.variance * fit.growth *
       (slopes.transpose() * slopes).inverse().topLeftCorner(kCommon, kCommon);
   fit.std = covariance.diagonal().cwiseSqrt();
-  fit.covariance = covariance(0, 1);
+  fit.correlation = covariance(0, 1) / (fit.std[0] * fit.std[1]);
   return fit;
 }
 
-}  // namespace
-
-std::optional<Identification> identify_rubbing(const std::vector<MotionRecord>& records) {
-  const double step = typical_step({records.front()});
-  const double pace = pace_of(on_grid(records.front(), step), step, first_noise({records.front()}));
-  if (!(pace > 0)) return {};
-  std::vector<Samples> all;
-  double unit = 0;
-  for (const MotionRecord& record : records) {
-    std::vector<Index> there;
-    for (Index i = 0; i < record.time.size(); ++i) {
-      if (std::isfinite(record.output(0, i))) there.push_back(i);
-    }
-    const VectorXd time = record.time(there), output = record.output.row(0)(there);
-    all.push_back({(time.array() - time[0]).matrix(), output});
-    unit = std::max(unit, (output.array() - output(Eigen::last)).abs().maxCoeff());
+/// Leaves out, with their parameters, records with fewer turns than are needed.
+std::vector<Samples> with_turns(const std::vector<Samples>& all, const VectorXd& p) {
+  std::vector<Samples> kept;
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    std::vector<Turn> turns;
+    motion_of(p, static_cast<Index>(r), all[r].time, &turns);
+    if (until(all[r], turns, 0, kFewestTurns).time.size() > 0) kept.push_back(all[r]);
   }
-  for (Samples& samples : all) samples.output /= unit;
+  return kept;
+}
 
-  std::optional<RubbingFit> fit;
-  VectorXd p = started(all, pace);
+/// The fit of as many samples as leave noise alone; none if even few of them do not.
+std::optional<RubbingFit> white_fit(const std::vector<Samples>& all, VectorXd p) {
   std::size_t k = 0;
+  std::optional<RubbingFit> fit;
   for (; k < kLeastSizes.size(); ++k) {
     fit = fit_until(all, p, kLeastSizes[k]);
     if (!fit) return {};
@@ -279,36 +283,98 @@ std::optional<Identification> identify_rubbing(const std::vector<MotionRecord>& 
     if (fit->growth < kNoiseWhiteness) break;
   }
   if (k == kLeastSizes.size()) return {};
-  // What fewer samples show otherwise is doubtful.
-  for (std::size_t next = k + 1; next < std::min(k + 3, kLeastSizes.size()); ++next) {
-    const auto other = fit_until(all, p, kLeastSizes[next]);
+  // What fewer samples show otherwise is doubtful: friction that fades at low speed hides in noise.
+  bool compared = false;
+  for (++k; k < kLeastSizes.size(); ++k) {
+    const auto other = fit_until(all, p, kLeastSizes[k]);
     if (!other) break;
-    const VectorXd change = (other->parameters - p).head(kCommon);
-    fit->std = fit->std.cwiseMax(change.cwiseAbs());
+    if (other->variance == fit->variance) continue;  // of the same samples
+    fit->std = fit->std.cwiseMax(kOfChange * (other->parameters - p).head(kCommon).cwiseAbs());
+    compared = true;
   }
-  for (Index i = 0; i < kCommon; ++i)
+  if (!compared) fit->std *= kNotCompared;
+  for (Index i = 0; i < kCommon; ++i) {
     fit->std[i] = std::hypot(fit->std[i], kNotConstant[static_cast<std::size_t>(i)]);
-  if (!(fit->std[0] < kSureFrequency && fit->std[1] < 1 && fit->std[2] < kSureFriction &&
-        std::abs(p[1]) < kMostRatio)) {
-    return {};
   }
+  const bool grows = p[1] < -2 * fit->std[1], turns = std::abs(p[1]) < kMostRatio;
+  const bool determined =
+      fit->std[0] < kSureFrequency && fit->std[1] < kSureFrequency && fit->std[2] < kSureFriction;
+  return determined && turns && !grows ? fit : std::nullopt;
+}
+
+Identification described(const RubbingFit& fit, double unit) {
   Identification result;
-  MeasuredMode& mode = result.modes.emplace_back();
+  const VectorXd& p = fit.parameters;
+  MeasuredMode mode;
   mode.natural_frequency = std::exp(p[0]);
-  mode.natural_frequency_std = mode.natural_frequency * fit->std[0];
-  mode.damping_ratio = p[1];
-  mode.damping_ratio_std = fit->std[1];
-  mode.covariance = mode.natural_frequency * fit->covariance;
-  mode.eigenvalues[0] = mode.natural_frequency * Complex(-p[1], std::sqrt(1 - p[1] * p[1]));
+  mode.damping_ratio = std::clamp(p[1], -kMostRatio, kMostRatio);
+  const double turning = std::sqrt(1 - mode.damping_ratio * mode.damping_ratio);
+  mode.eigenvalues[0] = mode.natural_frequency * Complex(-mode.damping_ratio, turning);
   mode.eigenvalues[1] = std::conj(mode.eigenvalues[0]);
+  mode.natural_frequency_std = mode.natural_frequency * fit.std[0];
+  mode.damping_ratio_std = fit.std[1];
+  mode.covariance = fit.correlation * mode.natural_frequency_std * mode.damping_ratio_std;
   mode.shape = VectorXcd::Ones(1);
   mode.stability = 1;
-  mode.energy = result.explained = fit->explained;
+  mode.energy = result.explained = fit.explained;
+  result.modes = {mode};
   result.order = 2;
-  result.noise = VectorXd::Constant(1, unit * std::sqrt(fit->variance));
-  result.whiteness = fit->growth;
+  result.noise = VectorXd::Constant(1, unit * std::sqrt(fit.variance));
+  result.whiteness = fit.growth;
   result.friction = unit * std::exp(p[2]);
-  result.friction_std = result.friction * fit->std[2];
+  result.friction_std = result.friction * fit.std[2];
+  return result;
+}
+
+/// The friction's mode in records of one channel.
+std::optional<Identification> rubbing_mode(const std::vector<MotionRecord>& records) {
+  std::vector<Samples> all;
+  double unit = 0, pace = 0;
+  for (const MotionRecord& record : records) {
+    if (all.size() == kMostRecords) break;
+    std::vector<Index> there;
+    for (Index i = 0; i < record.time.size(); ++i) {
+      if (std::isfinite(record.output(0, i))) there.push_back(i);
+    }
+    const VectorXd time = record.time(there), output = record.output.row(0)(there);
+    all.push_back({(time.array() - time[0]).matrix(), output});
+    const double size = (output.array() - output(Eigen::last)).abs().maxCoeff();
+    if (size <= unit) continue;
+    unit = size;
+    const double step = typical_step({record});
+    pace = pace_of(on_grid(record, step), step, first_noise({record}));
+  }
+  if (!(pace > 0)) return {};
+  for (Samples& samples : all) samples.output /= unit;
+  VectorXd p = started(all, pace);
+  const std::vector<Samples> turning = with_turns(all, p);
+  if (!turning.empty()) {
+    if (turning.size() < all.size()) p = started(turning, pace);
+    if (const auto fit = white_fit(turning, p)) return described(*fit, unit);
+  }
+  // Not known, but it may be all that there is.
+  const auto fit = fit_until(all, p, 0, 1);
+  if (!fit || !(fit->growth < kNoiseWhiteness && fit->std[2] < kLikelyFriction)) return {};
+  Identification result = described(*fit, unit);
+  result.rejected = std::exchange(result.modes, {});
+  result.friction = result.friction_std = 0;
+  return result;
+}
+
+}  // namespace
+
+std::optional<Identification> identify_rubbing(const std::vector<MotionRecord>& records) {
+  std::optional<Identification> result = rubbing_mode(records);
+  if (result && !result->modes.empty()) return result;
+  std::vector<MotionRecord> cleaned = records;
+  std::vector<SteadyLine> hums;
+  for (MotionRecord& record : cleaned) {
+    for (SteadyLine& hum : take_hums(record)) hums.push_back(std::move(hum));
+  }
+  if (hums.empty()) return result;
+  result = rubbing_mode(cleaned);
+  if (!result || result->modes.empty()) return result;
+  for (const SteadyLine& hum : hums) result->rejected.push_back(to_mode(hum));
   return result;
 }
 

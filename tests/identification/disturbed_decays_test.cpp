@@ -96,17 +96,16 @@ struct Joint {
 
   /// `force(v)` scales the friction, by the speed in units of omega.
   template <typename Force>
-  Joint(Dice& draw, double weight, const Force& force) {
+  Joint(Dice& draw, double weight, const Force& force, Index samples = 400) {
     mode = {draw.log_uniform(3, 40), draw.log_uniform(0.005, 0.15)};
     friction = weight * draw.log_uniform(0.01, 0.05);
     constexpr Index kSteps = 200;
     const double step = 2 * std::numbers::pi / mode.w / 30, h = step / kSteps;
     const double noise = draw.log_uniform(1e-4, 3e-3), rest = draw.normal();
     const bool rounded = draw.integer(0, 1) == 1;
-    constexpr Index kSamples = 400;
-    record = {Eigen::VectorXd(kSamples), Eigen::MatrixXd(1, kSamples), {}};
+    record = {Eigen::VectorXd(samples), Eigen::MatrixXd(1, samples), {}};
     double y = 1, v = 0;
-    for (Index i = 0; i < kSamples; ++i) {
+    for (Index i = 0; i < samples; ++i) {
       record.time[i] = step * static_cast<double>(i);
       const double seen = rest + y;
       record.output(0, i) =
@@ -171,10 +170,39 @@ TEST(DisturbedDecays, ReleasesOfAJointThatRubsShareModeAndFriction) {
   MotionRecord other = joint.record;  // later, and about another rest
   other = part_of(other, 7, other.time.size());
   other.output.array() += 0.3;
-  const Identification found = identify_decays({joint.record, other});
+  const MotionRecord still = part_of(joint.record, 340, 400);  // hardly a turn
+  const Identification found = identify_decays({joint.record, other, still});
   ASSERT_EQ(found.modes.size(), 1U);
   EXPECT_NEAR(found.modes[0].natural_frequency, joint.mode.w, 1e-3 * joint.mode.w);
   EXPECT_NEAR(found.friction, joint.friction, 0.05 * joint.friction);
+}
+
+TEST(DisturbedDecays, AHumDoesNotHideAJointThatRubs) {
+  Dice draw(601);
+  Joint joint(
+      draw, 1, [](double) { return 1.0; }, 1200);
+  for (Index i = 0; i < joint.record.time.size(); ++i) {
+    joint.record.output(0, i) += 0.01 * std::sin(0.9 * static_cast<double>(i));
+  }
+  const Identification found = identify_decays({joint.record});
+  ASSERT_EQ(found.modes.size(), 1U);
+  EXPECT_NEAR(found.friction, joint.friction, 0.05 * joint.friction);
+  ASSERT_EQ(found.rejected.size(), 1U);
+  EXPECT_NEAR(found.rejected[0].natural_frequency, 0.9 / joint.record.time[1], 0.1);
+}
+
+/// Friction that ends the motion after a turn or two explains it as well as a sum of modes.
+TEST(DisturbedDecays, AJointThatHardlyTurnsHasNoFalseModes) {
+  int believed = 0;
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    Dice draw(700 + seed);
+    const Joint joint(draw, 8, [](double) { return 1.0; });
+    for (const MeasuredMode& mode : identify_decays({joint.record}).modes) {
+      ++believed;
+      EXPECT_NEAR(mode.natural_frequency, joint.mode.w, 0.01 * joint.mode.w) << seed;
+    }
+  }
+  EXPECT_GE(believed, 4);
 }
 
 TEST(DisturbedDecays, AHumIsTakenAwayAndMakesNoAmbientMotion) {
