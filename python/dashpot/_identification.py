@@ -71,6 +71,11 @@ class Identification(Result):
     correlations of one half of the records by the other half's model."""
     order: int
     """Eigenvalues of the model."""
+    friction: float
+    """Coulomb friction of one channel's decays, as the deflection whose spring it balances, in the
+    channel's unit; 0: the model has none."""
+    friction_std: float
+    """Its standard deviation."""
 
 
 def _measured(found: dict[str, Any], channels: int) -> MeasuredModes:

@@ -97,6 +97,8 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
   result["whiteness"] = found.whiteness;
   result["explained"] = found.explained;
   result["order"] = found.order;
+  result["friction"] = found.friction;
+  result["friction_std"] = found.friction_std;
   return result;
 }
 

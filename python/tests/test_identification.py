@@ -26,6 +26,18 @@ def check(found):
     assert np.allclose(modes.shapes[0], np.array([2, 1]) / np.sqrt(5), atol=0.01)
 
 
+def test_finds_the_friction_of_one_joint():
+    t = np.arange(0, 6, 0.01)  # undamped: each half turn takes 2 x 0.02 from the amplitude
+    half = 9 * t // np.pi
+    y = (0.98 - 0.04 * half) * np.cos(9 * t) + 0.02 * (-1) ** half
+    y += 1e-4 * np.random.default_rng(1).normal(size=len(t))
+    found = dashpot.identify(t, y, find=False)
+    assert found.modes.natural_frequency == pytest.approx([9], abs=0.01)
+    assert abs(found.modes.damping_ratio[0]) < 0.001
+    assert found.friction == pytest.approx(0.02, rel=0.03)
+    assert found.friction_std < 0.001
+
+
 def test_finds_the_modes_of_a_decay():
     t, y = decay(np.random.default_rng(1))
     found = dashpot.identify(t, y, find=False)
