@@ -85,8 +85,8 @@ class LoopGoal {
     std::optional<controller::Pose> tool;  ///< T in the tip link
     std::optional<controller::TipSpeed> tip_speed;
   };
-  /// Makes all of a change, or nothing if the controller refuses its result: DASHPOT_OK, or the code
-  /// of the refusal, with its reason in one line. Warnings of the controller go to stderr.
+  /// Makes all of a change, or nothing if the controller refuses its result: DASHPOT_OK, or the
+  /// code of the refusal, with its reason in one line. Warnings of the controller go to stderr.
   std::int32_t change(const Change& change, std::string& reason);
   /// The last T in the tip link for the controller; the loop may not have taken it up yet.
   controller::Pose latest_tool();
