@@ -17,7 +17,7 @@ namespace dashpot::identification {
 namespace {
 
 constexpr int kFewestTurns = 4;        ///< fewer show friction and damping as one
-constexpr double kSureFriction = 0.2;  ///< relative deviation: known less well, it is not believed
+constexpr double kSureFriction = 0.4;  ///< relative deviation: known less well, it is not believed
 constexpr double kLikelyFriction = 0.5;  ///< relative deviation: it is there, whatever its size
 constexpr double kSureFrequency = 0.05;  ///< relative deviation, and of the ratio
 constexpr double kNoiseWhiteness = 1.5;  ///< growth of variances: with more it is not noise
