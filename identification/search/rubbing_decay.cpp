@@ -210,15 +210,23 @@ double growth_of(const VectorXd& rest) {
   return growth;
 }
 
-/// The samples up to the last turn that is larger; empty if fewer turns are.
-Samples until(const Samples& samples, const std::vector<Turn>& turns, double size, int fewest) {
-  const auto large = std::count_if(turns.begin(), turns.end(), [&](const Turn& turn) {
-    return turn.size > size && turn.time <= samples.time(Eigen::last);
-  });
-  if (large < fewest) return {};
-  const double last = turns[static_cast<std::size_t>(large) - 1].time;
-  const Index n = (samples.time.array() <= last).count();
-  return {samples.time.head(n), samples.output.head(n)};
+/// The samples of each record up to its last turn that is larger than so many frictions; empty if
+/// fewer turns are.
+std::vector<Samples> before_turns(const std::vector<Samples>& all, const VectorXd& p, double least,
+                                  int fewest) {
+  std::vector<Samples> used;
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    const VectorXd& time = all[r].time;
+    std::vector<Turn> turns;
+    motion_of(p, static_cast<Index>(r), time, &turns);
+    const auto large = std::count_if(turns.begin(), turns.end(), [&](const Turn& turn) {
+      return turn.size > least * std::exp(p[2]) && turn.time <= time(Eigen::last);
+    });
+    const double last = large < fewest ? -1 : turns[static_cast<std::size_t>(large) - 1].time;
+    const Index n = (time.array() <= last).count();
+    used.push_back({time.head(n), all[r].output.head(n)});
+  }
+  return used;
 }
 
 struct RubbingFit {
@@ -230,12 +238,9 @@ struct RubbingFit {
 /// Refines a fit on the samples before the turns whose size is `least` frictions.
 std::optional<RubbingFit> fit_until(const std::vector<Samples>& all, VectorXd p, double least,
                                     int fewest = kFewestTurns) {
-  std::vector<Samples> used;
+  const std::vector<Samples> used = before_turns(all, p, least, fewest);
   double motion = 0;
-  for (std::size_t r = 0; r < all.size(); ++r) {
-    std::vector<Turn> turns;
-    motion_of(p, static_cast<Index>(r), all[r].time, &turns);
-    const Samples& there = used.emplace_back(until(all[r], turns, least * std::exp(p[2]), fewest));
+  for (const Samples& there : used) {
     if (there.time.size() == 0) return {};
     motion += (there.output.array() - there.output.mean()).square().sum();
   }
@@ -261,17 +266,6 @@ std::optional<RubbingFit> fit_until(const std::vector<Samples>& all, VectorXd p,
   return fit;
 }
 
-/// Leaves out, with their parameters, records with fewer turns than are needed.
-std::vector<Samples> with_turns(const std::vector<Samples>& all, const VectorXd& p) {
-  std::vector<Samples> kept;
-  for (std::size_t r = 0; r < all.size(); ++r) {
-    std::vector<Turn> turns;
-    motion_of(p, static_cast<Index>(r), all[r].time, &turns);
-    if (until(all[r], turns, 0, kFewestTurns).time.size() > 0) kept.push_back(all[r]);
-  }
-  return kept;
-}
-
 /// The fit of as many samples as leave noise alone; none if even few of them do not.
 std::optional<RubbingFit> white_fit(const std::vector<Samples>& all, VectorXd p) {
   std::size_t k = 0;
@@ -283,7 +277,8 @@ std::optional<RubbingFit> white_fit(const std::vector<Samples>& all, VectorXd p)
     if (fit->growth < kNoiseWhiteness) break;
   }
   if (k == kLeastSizes.size()) return {};
-  // What fewer samples show otherwise is doubtful: friction that fades at low speed hides in noise.
+  // A change of the estimate with fewer samples widens its deviations: friction that fades at low
+  // speed hides in noise.
   bool compared = false;
   for (++k; k < kLeastSizes.size(); ++k) {
     const auto other = fit_until(all, p, kLeastSizes[k]);
@@ -347,12 +342,18 @@ std::optional<Identification> rubbing_mode(const std::vector<MotionRecord>& reco
   if (!(pace > 0)) return {};
   for (Samples& samples : all) samples.output /= unit;
   VectorXd p = started(all, pace);
-  const std::vector<Samples> turning = with_turns(all, p);
-  if (!turning.empty()) {
-    if (turning.size() < all.size()) p = started(turning, pace);
-    if (const auto fit = white_fit(turning, p)) return described(*fit, unit);
+  // A weak push does not spoil the others.
+  const std::vector<Samples> before = before_turns(all, p, 0, kFewestTurns);
+  std::vector<Samples> turning;
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    if (before[r].time.size() > 0) turning.push_back(all[r]);
   }
-  // Not known, but it may be all that there is.
+  if (!turning.empty() && turning.size() < all.size()) {
+    all = turning;
+    p = started(all, pace);
+  }
+  if (const auto fit = white_fit(all, p)) return described(*fit, unit);
+  // The mode is not determined, but friction may explain all.
   const auto fit = fit_until(all, p, 0, 1);
   if (!fit || !(fit->growth < kNoiseWhiteness && fit->std[2] < kLikelyFriction)) return {};
   Identification result = described(*fit, unit);

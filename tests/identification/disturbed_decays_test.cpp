@@ -161,6 +161,7 @@ TEST(DisturbedDecays, NoFrictionIsFoundWhereThereIsNone) {
     });
     two.output.conservativeResize(1, Eigen::NoChange);
     EXPECT_EQ(identify_decays({two}).friction, 0) << seed;
+    EXPECT_EQ(identify_decays({two, part_of(two, 500, 600)}).friction, 0) << seed;
   }
 }
 
