@@ -161,6 +161,20 @@ TEST(Identify, SaysFirstWhatARecordShows) {
   EXPECT_EQ(linear["verdict"], "decay");
   ASSERT_EQ(linear["modes"].size(), 1U);
   EXPECT_NEAR(linear["modes"][0]["natural_frequency"].get<double>(), std::hypot(5, 0.15), 1e-4);
+  // Undamped, but rubbing: each half turn takes 0.04 from the amplitude, until it sticks.
+  const auto rubbing = [](double t) {
+    const double half = std::floor(9 * t / std::numbers::pi);
+    if (half > 24) return 0.0;
+    return (0.98 - 0.04 * half) * std::cos(9 * t) + (std::fmod(half, 2) == 0 ? 0.02 : -0.02);
+  };
+  const std::string rubs = record("rubbing.csv", 1.2, rubbing);
+  const Json joint = identify({rubs, "--channels", "q1"});
+  ASSERT_EQ(joint["modes"].size(), 1U);
+  EXPECT_NEAR(joint["modes"][0]["natural_frequency"].get<double>(), 9, 1e-3);
+  EXPECT_NEAR(joint["friction"].get<double>(), 1.2 * 0.02, 1e-3);
+  EXPECT_GT(joint["friction_std"].get<double>(), 0);
+  EXPECT_THAT(run_program({"identify", rubs, "--channels", "q1"}).out,
+              HasSubstr("with Coulomb friction worth 0.02400 +- "));
   const Json cycle = verdict("cycle.csv", 0.1, beat, {});
   EXPECT_EQ(cycle["verdict"], "limit cycle");
   EXPECT_THAT(cycle["advice"].dump(), HasSubstr("5.00"));

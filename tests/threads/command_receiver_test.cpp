@@ -293,7 +293,7 @@ TEST(CommandReceiver, OutlivesItsSenders) {
       // The first sender's last commands may come late.
       through = receiver.fetch() && sender.is_one(receiver.command());
     }
-    if (!through && receiver.tally().rejected() == 0) {
+    if (receiver.tally().accepted() + receiver.tally().rejected() == 0) {
       GTEST_SKIP() << "multicast does not work on this machine: " << url;
     }
     ASSERT_TRUE(through) << first_sequence;

@@ -253,6 +253,11 @@ class Tune(unittest.TestCase):
                 self.assertEqual(self.value('[dashpot.store.state.a.delay, dashpot.store.state.a.gain_margin]'),
                                  [1, 1.5])
 
+    def test_is_not_current_while_answers_wait_to_be_drawn(self):
+        drawn = '''(() => { const was = dashpot.later; dashpot.later = %s; dashpot.noteDrawn(); dashpot.later = was;
+            return dashpot.current; })()'''
+        self.assertEqual([self.value(drawn % later) for later in (1, 0)], [False, True])
+
     def test_mass_of_a_payload_takes_its_inertia_along(self):
         self.open_other(self.file('a.yaml',
                                   f'robot: {{{PANDA}, payload: {{mass: 2, center: [0, 0.01, 0.1], inertia: 0.02}}}}\n'))
