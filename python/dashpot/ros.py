@@ -11,6 +11,7 @@ import math
 import signal
 import statistics
 import sys
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -27,6 +28,7 @@ ARROW = 0.3  # m, of the marker
 WATCHED = 50  # states before the torque begins
 PERIOD_TOLERANCE = 0.2  # of the period
 FADE = 0.2  # s from a stop to no torque
+REPEATS = 30  # of the last torque, which is zero, every 10 ms: a topic may lose one message
 
 
 class ModesNode:
@@ -93,6 +95,15 @@ class ModesNode:
         self.ended = self.ended or self._stop or not self._started
         self._stop = True
 
+    def let_go(self) -> None:
+        """Publishes a torque of zero, if torques were commanded, until subscribers have had time for it."""
+        if self._torque is None or not self.torques:
+            return
+        zero = self.msg["std_msgs"].Float64MultiArray(data=[0.0] * len(self.names))
+        for _ in range(REPEATS):
+            self._torque.publish(zero)
+            time.sleep(0.01)
+
     def _judge(self, changes: Any) -> Any:
         """Refuses gains and modes that the controller refuses."""
         result = importlib.import_module("rcl_interfaces.msg").SetParametersResult
@@ -142,12 +153,12 @@ class ModesNode:
         self.failure = self.failure or reason
         self.ended = True
 
-    def _answer(self, time: int, velocity: Any) -> None:
+    def _answer(self, ns: int, velocity: Any) -> None:
         """One tick with the state of that time, ns."""
         if self.ended:
             return
         if not self._started:
-            self._stamps.append(time)
+            self._stamps.append(ns)
             if len(self._stamps) < WATCHED:
                 return
             period = 1e-9 * statistics.median(
@@ -163,15 +174,15 @@ class ModesNode:
                 return
             self._started = True
         if self._stop and not self.dry_run:
-            self._ending.begin(time)
-        torque, status = self.controller.update(time, self._q, velocity)
+            self._ending.begin(ns)
+        torque, status = self.controller.update(ns, self._q, velocity)
         self.statuses[status] += 1
         if self.dry_run:
             if status >= Status.FAULT_LATCHED:  # another program or person moves the arm
                 self.controller.release()
             self.ended = self.ended or self._stop
             return
-        left = self._ending.left(time, self._q) if self._stop else 1.0
+        left = self._ending.left(ns, self._q) if self._stop else 1.0
         if self.controller.needs_brakes() and not (
                 status >= Status.STATE_NOT_FINITE and torque.any()):  # the last weight, for 2 s
             # A topic has no brakes: the torque ends.
@@ -297,6 +308,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(number, lambda *_: modes.stop())
     while rclpy.ok() and not modes.ended:
         rclpy.spin_once(node, timeout_sec=0.05)
+    modes.let_go()
     node.destroy_node()
     rclpy.shutdown()
     for status, count in enumerate(modes.statuses):
