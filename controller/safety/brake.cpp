@@ -26,7 +26,7 @@ constexpr double kMemory = 0.5;         // s, ten times as long as the brake nee
 constexpr double kPushed = 0.5;         // of velocity limits: somebody pushes the arm
 constexpr double kPushedLeast = 1;      // rad/s, or m/s: the speed of a pushing hand
 constexpr double kStiffness = 2.0 / 9;  // times c^2: with it motion decays with c / 3 and 2 c / 3
-constexpr double kSmooth = 0.1;         // of T: time constant of velocities
+constexpr double kSmooth = 0.05;        // of T: time constant of velocities
 constexpr double kStands = 0.03;        // of a velocity limit
 constexpr double kSlows = 2;            // s: slower deceleration means that the arm is driven
 constexpr double kFades = 0.5;          // s: of the resistance while the motion is not observed
@@ -100,7 +100,6 @@ JointVector Brake::stop(const Motion& motion, double inward, Resistance resistan
     if (q < bounds.lower - bounds.outermost) wanted[i] = kReturn * inward * bounds.velocity;
     const double v = std::clamp(motion.qd[i], -most, most);
     v_[i] += share * (v - v_[i]);
-    bounds.growth = 0;
     change[i] = wanted[i] - (stands_ ? v_[i] : v);
   }
   add_product(motion.robot.M, change, momentum);
@@ -127,15 +126,16 @@ void Brake::resist(const Motion& motion, const JointVector& wanted, double stiff
     const double least = kStands * bounds.velocity;
     slow &= v <= least || v - bounds.slowest > least;
     const double moved = seen_ ? motion.q[i] - q_[i] : 0;
-    if (wanted[i] * moved <= 0) way[i] = moved;  // on its way back only the brake presses
+    const bool resisted = bounds.full * moved >= 0;  // else no torque is left for it
+    if (resisted && wanted[i] * moved <= 0)
+      way[i] = moved;  // on its way back only the brake presses
   }
   stands_ |= slow;
   add_product(motion.robot.M, way, growth, -stiffness);
   for (Eigen::Index i = 0; i < n_ && stands_; ++i) {
     Bounds& bounds = joint(i);
-    const double most = kResists * bounds.torque, before = bounds.resistance;
-    bounds.resistance = std::clamp(before + growth[i], -most, most);
-    bounds.growth = bounds.resistance - before;
+    const double most = kResists * bounds.torque;
+    bounds.resistance = std::clamp(bounds.resistance + growth[i], -most, most);
   }
   q_ = motion.q;
   seen_ = true;
@@ -143,8 +143,9 @@ void Brake::resist(const Motion& motion, const JointVector& wanted, double stiff
 
 void Brake::limited(const Motion& motion, const JointVector& excess) noexcept {
   for (Eigen::Index i = 0; i < n_; ++i) {
-    const bool full = std::abs(excess[i] + held_weight(motion, i)) > kAllTorque * joint(i).torque;
-    if (full && excess[i] * joint(i).growth > 0) joint(i).resistance -= joint(i).growth;
+    const double torque = excess[i] + held_weight(motion, i);
+    const bool full = std::abs(torque) > kAllTorque * joint(i).torque;
+    joint(i).full = full ? torque : 0;
   }
 }
 

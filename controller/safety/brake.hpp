@@ -139,7 +139,7 @@ class Brake {
 
     double slowest = 0;     ///< least speed lately, rad/s
     double resistance = 0;  ///< r, N m
-    double growth = 0;      ///< of r in this tick, N m
+    double full = 0;        ///< the joint's torque where it is at its limit, N m, or 0
   };
   /// Bound of a joint in one direction.
   struct Bound {

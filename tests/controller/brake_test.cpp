@@ -334,5 +334,32 @@ TEST_F(BrakeClaims, DoubtsABrakeThatFeeds) {
   }
 }
 
+/// A standing arm resists a joint that yields, unless no torque is left for it: the resistance
+/// would drive the other joints in its place.
+TEST_F(BrakeClaims, ResistsWhatItHasTorqueFor) {
+  for (int arm = 0; arm < 20; ++arm) {
+    AnyArm any(engine);
+    any.draw(0, 0);
+    const JointVector from = any.q;
+    const Eigen::Index yielding =
+        std::uniform_int_distribution<Eigen::Index>(0, any.model.dof() - 1)(engine);
+    JointVector weight = 0 * any.q;
+    weight[yielding] = any.settings.limits.torque[yielding];
+    for (const double way : {-1.0, 1.0}) {
+      Brake brake(any.settings);
+      any.q = from;
+      JointVector x;
+      for (int k = 0; k < 20; ++k) {
+        const Brake::Motion motion{any.q, any.qd, any.robot, weight, nullptr};
+        x = brake.stop(motion, 0, Brake::Resistance::kGrows);
+        brake.constrain(motion, weight, true, x);
+        brake.limited(motion, x);
+        any.q[yielding] += 1e-5 * way;
+      }
+      EXPECT_EQ(x.norm() > 0, way > 0) << x;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dashpot::controller
