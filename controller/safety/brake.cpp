@@ -26,7 +26,7 @@ constexpr double kMemory = 0.5;         // s, ten times as long as the brake nee
 constexpr double kPushed = 0.5;         // of velocity limits: somebody pushes the arm
 constexpr double kPushedLeast = 1;      // rad/s, or m/s: the speed of a pushing hand
 constexpr double kStiffness = 2.0 / 9;  // times c^2: with it motion decays with c / 3 and 2 c / 3
-constexpr double kSmooth = 0.05;        // of T: time constant of velocities
+constexpr double kSmooth = 0.1;         // of T: time constant of velocities
 constexpr double kStands = 0.03;        // of a velocity limit
 constexpr double kSlows = 2;            // s: slower deceleration means that the arm is driven
 constexpr double kFades = 0.5;          // s: of the resistance while the motion is not observed
@@ -126,16 +126,16 @@ void Brake::resist(const Motion& motion, const JointVector& wanted, double stiff
     const double least = kStands * bounds.velocity;
     slow &= v <= least || v - bounds.slowest > least;
     const double moved = seen_ ? motion.q[i] - q_[i] : 0;
-    const bool resisted = bounds.full * moved >= 0;  // else no torque is left for it
-    if (resisted && wanted[i] * moved <= 0)
-      way[i] = moved;  // on its way back only the brake presses
+    const bool yields = bounds.full * moved < 0 && v > kPushed * bounds.velocity;
+    // On its way back only the brake presses.
+    const bool resisted = wanted[i] * moved <= 0 && resistance_left(motion, i, -moved) > 0;
+    if (resisted && !yields) way[i] = moved;
   }
   stands_ |= slow;
   add_product(motion.robot.M, way, growth, -stiffness);
   for (Eigen::Index i = 0; i < n_ && stands_; ++i) {
-    Bounds& bounds = joint(i);
-    const double most = kResists * bounds.torque;
-    bounds.resistance = std::clamp(bounds.resistance + growth[i], -most, most);
+    const double most = resistance_left(motion, i, growth[i]);
+    joint(i).resistance += std::clamp(growth[i], -most, most);
   }
   q_ = motion.q;
   seen_ = true;
@@ -144,14 +144,20 @@ void Brake::resist(const Motion& motion, const JointVector& wanted, double stiff
 void Brake::limited(const Motion& motion, const JointVector& excess) noexcept {
   for (Eigen::Index i = 0; i < n_; ++i) {
     const double torque = excess[i] + held_weight(motion, i);
-    const bool full = std::abs(torque) > kAllTorque * joint(i).torque;
-    joint(i).full = full ? torque : 0;
+    joint(i).full = std::abs(torque) > kAllTorque * joint(i).torque ? torque : 0;
   }
+}
+
+double Brake::resistance_left(const Motion& motion, Eigen::Index i, double way) const noexcept {
+  const double sign = std::copysign(1, way), torque = joint(i).torque;
+  const double most = std::min(kResists * torque, torque - sign * held_weight(motion, i));
+  return std::max(0.0, most - sign * joint(i).resistance);
 }
 
 void Brake::watch(const Motion& motion) noexcept {
   JointVector momentum = JointVector::Zero(n_);
-  const JointVector& qd = seen_ ? v_ : motion.qd;
+  JointVector qd = motion.qd;
+  for (Eigen::Index i = 0; i < n_ && seen_; ++i) qd[i] = 0.5 * (v_[i] + qd[i]);
   add_product(motion.robot.M, qd, momentum);
   const double energy = 0.5 * product(momentum, qd);
   double slow = 0, pushed = 0, power = 0;

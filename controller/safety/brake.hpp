@@ -38,18 +38,20 @@ double loop_lag(const Settings& settings) noexcept;
 /// spring vibrates if states are 30 ms late. An unknown torque e moves the arm by (9/2) T^2 M^-1 e.
 /// r is bounded to half of the torque limit in each joint: a person who pushes harder moves the
 /// arm, the held posture moves along, and after release the arm springs back by the deflection of
-/// r. r does not grow while a torque limit is reached. It waits while the springs' torque fades,
-/// and fades with a time constant of half a second while the motion is not observed. A joint on its
-/// way back from outside a limit adds to r only where it moves outward. A larger inertia than the
-/// model's makes the hold softer and less damped; no smaller gain makes it unstable, so it needs no
-/// second integral.
-/// A brake whose velocities are late, or whose model is wrong, may drive the arm back or shake it.
-/// `watch` softens such a brake: if the kinetic energy fell by half and rises again by a tenth of
-/// its first value, before the arm stands, T is doubled, up to eight times, until springs act
-/// again. It also doubts the brake: the energy may exceed its least value since the stop began or
-/// was softened by the most that the weight can have added, int (|w_i| + |r_i|) |qd_i| dt over
-/// about half a second, as if all of it were held wrongly, and by the energy of joints with half of
-/// their velocity limits (at least 1 rad/s), each by itself, because a person may push.
+/// r. Likewise a joint slips in which r and the weight take the whole torque limit, or which is
+/// faster than half of its velocity limit against its whole torque: its way adds nothing to r,
+/// which would drive other joints in its place. r waits while the springs' torque fades, and fades
+/// with a time constant of half a second while the motion is not observed. A joint on its way back
+/// from outside a limit adds to r only where it moves outward. A larger inertia than the model's
+/// makes the hold softer and less damped; no smaller gain makes it unstable, so it needs no second
+/// integral. A brake whose velocities are late, or whose model is wrong, may drive the arm back or
+/// shake it. `watch` softens such a brake: if the kinetic energy, with the mean of qd and v, in
+/// which noise counts less than a shake, fell by half and rises again by a tenth of its first
+/// value, before the arm stands, T is doubled, up to eight times, until springs act again. It also
+/// doubts the brake: the energy may exceed its least value since the stop began or was softened by
+/// the most that the weight can have added, int (|w_i| + |r_i|) |qd_i| dt over about half a second,
+/// as if all of it were held wrongly, and by the energy of joints with half of their velocity
+/// limits (at least 1 rad/s), each by itself, because a person may push.
 ///
 /// `constrain` finds the torque x' in excess of the weight w nearest to a desired torque x, in the
 /// sense of Gauss's principle of least constraint,
@@ -105,7 +107,7 @@ class Brake {
   Status constrain(const Motion& motion, const JointVector& last, bool stops,
                    JointVector& excess) noexcept;
 
-  /// Records x' = `excess` of the last `stop`: where it reaches a torque limit, r does not grow.
+  /// Records which joints x' = `excess` of the last `stop` takes to their torque limits.
   void limited(const Motion& motion, const JointVector& excess) noexcept;
   /// Records a motion in which a stop acts alone.
   void watch(const Motion& motion) noexcept;
@@ -139,7 +141,7 @@ class Brake {
 
     double slowest = 0;     ///< least speed lately, rad/s
     double resistance = 0;  ///< r, N m
-    double full = 0;        ///< the joint's torque where it is at its limit, N m, or 0
+    double full = 0;        ///< the torque, if it is at its limit, N m, or 0
   };
   /// Bound of a joint in one direction.
   struct Bound {
@@ -174,6 +176,8 @@ class Brake {
   double distance(const Motion& motion, Eigen::Index i, double way) const noexcept;
   /// Returns the torque limit less the weight, N m.
   double held_weight(const Motion& motion, Eigen::Index i) const noexcept;
+  /// Returns how much r may still change in a direction, N m.
+  double resistance_left(const Motion& motion, Eigen::Index i, double way) const noexcept;
   double braking_torque(const Motion& motion, Eigen::Index i) const noexcept;
   /// Values of an earlier tick. A change d of the torque changes (M^-1 torque)_i by at most r_i sum
   /// r_j |d_j| with r_i^2 = (M^-1)_ii. As long as that stays far from all bounds, and posture and

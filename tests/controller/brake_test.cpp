@@ -335,28 +335,90 @@ TEST_F(BrakeClaims, DoubtsABrakeThatFeeds) {
 }
 
 /// A standing arm resists a joint that yields, unless no torque is left for it: the resistance
-/// would drive the other joints in its place.
+/// would drive the other joints in its place. It takes half of a torque limit at most, and what
+/// comes back where it was is resisted no more.
 TEST_F(BrakeClaims, ResistsWhatItHasTorqueFor) {
   for (int arm = 0; arm < 20; ++arm) {
     AnyArm any(engine);
+    any.settings.limits.position_lower.setConstant(-1e6);
+    any.settings.limits.position_upper.setConstant(1e6);
     any.draw(0, 0);
-    const JointVector from = any.q;
     const Eigen::Index yielding =
         std::uniform_int_distribution<Eigen::Index>(0, any.model.dof() - 1)(engine);
     JointVector weight = 0 * any.q;
-    weight[yielding] = any.settings.limits.torque[yielding];
+    for (const double share : {0.8, 1.0}) {
+      weight[yielding] = share * any.settings.limits.torque[yielding];
+      const Brake::Motion motion{any.q, any.qd, any.robot, weight, nullptr};
+      Brake brake(any.settings);
+      JointVector x;
+      for (int k = 0; k <= 40; ++k) {
+        x = brake.stop(motion, 0, Brake::Resistance::kGrows);
+        if (k == 20) EXPECT_EQ(x.norm() > 0, share < 1) << x;
+        any.q[yielding] += k < 20 ? -1e-6 : 1e-6;
+      }
+      if (share < 1) EXPECT_LE(x.norm(), 1e-9 * any.robot.M.norm());
+    }
     for (const double way : {-1.0, 1.0}) {
       Brake brake(any.settings);
-      any.q = from;
+      weight.setZero();
       JointVector x;
-      for (int k = 0; k < 20; ++k) {
-        const Brake::Motion motion{any.q, any.qd, any.robot, weight, nullptr};
-        x = brake.stop(motion, 0, Brake::Resistance::kGrows);
-        brake.constrain(motion, weight, true, x);
-        brake.limited(motion, x);
-        any.q[yielding] += 1e-5 * way;
+      for (int k = 0; k < 2000; ++k) {
+        x = brake.stop({any.q, any.qd, any.robot, weight, nullptr}, 0, Brake::Resistance::kGrows);
+        any.q[yielding] += 10 * way;
       }
-      EXPECT_EQ(x.norm() > 0, way > 0) << x;
+      const JointVector most = 0.5 * any.settings.limits.torque;
+      EXPECT_NEAR(x[yielding], -way * most[yielding], 1e-9 * most[yielding]);
+      EXPECT_LE((x.cwiseAbs() - most).maxCoeff(), 1e-9 * most.norm()) << x;
+    }
+  }
+}
+
+/// A joint that moves fast against its whole torque is not resisted further.
+TEST_F(BrakeClaims, LetsYieldWhatIsFast) {
+  for (int arm = 0; arm < 20; ++arm) {
+    AnyArm any(engine);
+    any.draw(0, 0);
+    const JointVector weight = 0 * any.q;
+    for (const double speed : {0.4, 0.6}) {
+      for (const double torque : {-1.0, 0.9, 1.0}) {  // the joint moves down
+        Brake brake(any.settings);
+        any.qd.setZero();
+        const Brake::Motion motion{any.q, any.qd, any.robot, weight, nullptr};
+        brake.stop(motion, 0, Brake::Resistance::kGrows);  // the arm stands
+        any.qd[1] = -speed * any.settings.limits.velocity[1];
+        brake.limited(motion, torque * any.settings.limits.torque);
+        for (int k = 0; k < 100; ++k) {
+          if (k >= 50) any.q[1] -= 1e-6;  // the velocity is known by then
+          brake.stop(motion, 0, Brake::Resistance::kGrows);
+        }
+        any.qd.setZero();
+        for (int k = 0; k < 1000; ++k) brake.stop(motion, 0, Brake::Resistance::kGrows);
+        const double resistance = brake.stop(motion, 0)[1];
+        EXPECT_EQ(resistance > 1e-9 * any.robot.M(1, 1), speed < 0.5 || torque < 1)
+            << speed << ' ' << torque;
+      }
+    }
+  }
+}
+
+/// A brake that shakes a joint gets softer, though the mean velocity of the joint is small. Noise
+/// does not make it softer.
+TEST_F(BrakeClaims, SoftensWhereAJointShakes) {
+  for (int arm = 0; arm < 20; ++arm) {
+    AnyArm any(engine);
+    any.draw(0, 0);
+    const JointVector fast = 0.9 * any.settings.limits.velocity;
+    const Eigen::Index last = any.model.dof() - 1;
+    const double shake = std::sqrt(fast.dot(any.robot.M * fast) / any.robot.M(last, last));
+    for (const double share : {0.4, 1.0}) {
+      Brake brake(any.settings);
+      for (int k = 0; k < 300; ++k) {
+        any.qd = std::max(0.05, std::exp(-0.02 * k)) * fast;
+        if (k >= 150) any.qd[last] = (k % 2 == 0 ? share : -share) * shake;
+        brake.stop(any.motion(), 0, Brake::Resistance::kGrows);
+        brake.watch(any.motion());
+      }
+      EXPECT_EQ(brake.stopping_time() > any.settings.limits.stopping_time, share == 1);
     }
   }
 }
