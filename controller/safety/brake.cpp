@@ -127,9 +127,9 @@ void Brake::resist(const Motion& motion, const JointVector& wanted, double stiff
     slow &= v <= least || v - bounds.slowest > least;
     const double moved = seen_ ? motion.q[i] - q_[i] : 0;
     const bool yields = bounds.full * moved < 0 && v > kPushed * bounds.velocity;
-    // On its way back only the brake presses.
-    const bool resisted = wanted[i] * moved <= 0 && resistance_left(motion, i, -moved) > 0;
-    if (resisted && !yields) way[i] = moved;
+    const bool returns = wanted[i] * moved > 0;  // only the brake presses
+    const double most = resistance_left(motion, i, -moved) / (stiffness * motion.robot.M(i, i));
+    if (!returns && !yields) way[i] = std::clamp(moved, -most, most);
   }
   stands_ |= slow;
   add_product(motion.robot.M, way, growth, -stiffness);
