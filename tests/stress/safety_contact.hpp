@@ -32,8 +32,8 @@ inline Act table(double depth, bool smooth = false) {
     rig.goal = Goal::at(rig.tip_at(rig.position()));
     rig.goal->tip.position.z() -= 0.03 + depth;
     rig.run(8);
-    // A springy plane throws a light wrist when the springs end (docs/safety.md).
-    row.finish(rig, {smooth ? 5 : 1.1, true, true});
+    // A springy plane throws a light wrist when the springs end.
+    row.finish(rig, {smooth ? 4 : 1.1, true, true});
     row.note = std::to_string(row.seen.changes) + " changes of status";
   };
 }
