@@ -44,8 +44,10 @@ double loop_lag(const Settings& settings) noexcept;
 /// with a time constant of half a second while the motion is not observed. A joint on its way back
 /// from outside a limit adds to r only where it moves outward. A larger inertia than the model's
 /// makes the hold softer and less damped; no smaller gain makes it unstable, so it needs no second
-/// integral. A brake whose velocities are late, or whose model is wrong, may drive the arm back or
-/// shake it. `watch` softens such a brake: if the kinetic energy, with the mean of qd and v, in
+/// integral.
+///
+/// A brake whose velocities are late, or whose model is wrong, may drive the arm back or shake it.
+/// `watch` softens such a brake: if the kinetic energy, with the mean of qd and v, in
 /// which noise counts less than a shake, fell by half and rises again by a tenth of its first
 /// value, before the arm stands, T is doubled, up to eight times, until springs act again. It also
 /// doubts the brake: the energy may exceed its least value since the stop began or was softened by
